@@ -42,9 +42,9 @@ sanitized() {
 }
 sanitized pytest -q -n logical --dist loadfile -p no:cacheprovider \
     tests/run tests/result tests/loops tests/flexible/test_engines.py \
-    tests/linear/test_response.py tests/linear/test_modes.py tests/linear/test_damping.py tests/linear/test_exact.py \
-    tests/classical tests/integrate tests/breaks tests/model \
-    tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_culprit.py
+    tests/linear/test_response.py tests/linear/test_modes.py tests/linear/test_damping.py tests/linear/test_dynamic_stiffness.py \
+    tests/classical tests/integrate tests/discontinuities tests/model \
+    tests/engine/test_jacobian.py tests/engine/test_tangent.py tests/engine/test_failure_source.py
 
 echo "--- changed scenes, sanitized"
 sanitized tests.fuzz \

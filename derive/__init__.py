@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .language.element import Body, ForceElement, Hinge, Param, rotation_about
+    from .definition.element import Body, ForceElement, Hinge, Param, rotation_about
 
 __all__ = ["Body", "ForceElement", "Hinge", "Param", "rotation_about"]
 
@@ -17,7 +17,7 @@ __all__ = ["Body", "ForceElement", "Hinge", "Param", "rotation_about"]
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from .language import element
+    from .definition import element
 
     return getattr(element, name)
 

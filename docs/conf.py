@@ -16,14 +16,14 @@ copyright = "2026, mstmm contributors"
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "making.formulas",
-    "making.drawings",
-    "making.gallery",
-    "making.docstrings",
+    "tooling.formulas",
+    "tooling.drawings",
+    "tooling.gallery",
+    "tooling.docstrings",
 ]
 html_theme = "furo"
 html_title = "mstmm"
-html_static_path = ["making/static"]
+html_static_path = ["tooling/static"]
 html_css_files = ["pages.css"]
 html_math_renderer = "mathml"
 html_copy_source = False

@@ -7,7 +7,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "aim.h"
+#include "derivative_direction.h"
 #include "complex_lanes.h"
 
 /* change of a load by place carried to the parent
@@ -20684,4 +20684,4 @@ static int mstmm_complex_at_tangent_answered(mstmm_complex_state *state, int ind
     return 0;
 }
 
-#include "complex_swept.h"
+#include "complex_sweeps.h"

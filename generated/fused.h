@@ -23,13 +23,13 @@ typedef struct {
     const int *failures;
     int (*accelerations)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot);
     int (*accelerations_power)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, double *power, double *potential);
-    /* Where loops are closed; see derive/fuse/closing.py. */
+    /* Where loops are closed; see derive/fuse/loop_assembly.py. */
     int (*gaps)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *dq, double *gap, double *apart);
     int (*slips)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *du, double *strain);
     int (*accelerations_lanes)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *efforts, double *qdot, double *udot, int *codes);
     /* Fills codes (n); returns the number of states that failed. */
     long long (*accelerations_many)(const mstmm_batch *batch);
-    /* For implicit methods; see derive/fuse/implicit.py. */
+    /* For implicit methods; see derive/fuse/implicit_residual.py. */
     int (*residual)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r);
     int (*residual_power)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r, double *power);
     int (*residual_rate)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *r_t);
@@ -41,15 +41,15 @@ typedef struct {
     int (*rates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *dq);
     int (*coordinates)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, const double *steps, const double *x, const double *rho,
                        double *dq);
-    /* Inverse dynamics and the mass matrix; see derive/fuse/inverse.py. */
+    /* Inverse dynamics and the mass matrix; see derive/fuse/inverse_dynamics.py. */
     int (*required)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *efforts);
     int (*mass)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M);
-    /* A point of one body; see derive/fuse/points.py. */
+    /* A point of one body; see derive/fuse/point_kinematics.py. */
     int (*placed)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *place, double *axes);
     int (*moving)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *velocity);
     int (*jacobian)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *J);
     int (*jacobian_rate)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *end, double *J);
-    /* The slopes of the residual about a state; see derive/fuse/linear.py. */
+    /* The slopes of the residual about a state; see derive/fuse/linearisation.py. */
     int (*linear)(const double *p, const double *t, const double *q, const double *u, const double *memory, const double *a, double *M, double *C, double *K, double *G, double *r_t);
 } mstmm_fused;
 /* cdef end */

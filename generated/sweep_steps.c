@@ -3,11 +3,11 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "aim.h"
-#include "hinge.h"
+#include "derivative_direction.h"
+#include "hinge_call.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
-#include "tiles.h"
+#include "cache_tiling.h"
 
 mstmm_generic_forward_kernel *const mstmm_generic_forward_table[] = {
     mstmm_sweep_generic0_forward,

@@ -10,10 +10,10 @@ Names are loaded when they are first used: importing mstmm loads neither numpy n
 
 from __future__ import annotations
 
-from . import interrupts
+from . import signal_handling
 
-if interrupts.is_the_program():  # before the imports below, which take time
-    interrupts.end_at_once()
+if signal_handling.is_cli_process():  # before the imports below, which take time
+    signal_handling.exit_on_signal()
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -31,49 +31,70 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .atlas.atlas import Atlas, stability
-    from .bridge.advising import advise
-    from .bridge.charting import chart
-    from .bridge.compilation import compile_scene as compile
-    from .bridge.compilation import generate_file, register
-    from .bridge.equations import equations
-    from .bridge.reporting.report import report
-    from .runtime.advice.record import Advice
+    from .pipeline.advise import advise
+    from .pipeline.chart import chart
+    from .pipeline.compilation import compile_scene as compile
+    from .pipeline.compilation import generate_file, register
+    from .pipeline.equations import equations
+    from .pipeline.report.report import write_report
+    from .runtime.advice.advice import Advice
     from .runtime.chart.chart import Chart
-    from .runtime.model.loading import load_result
     from .runtime.model.model import Model
+    from .runtime.model.result_loading import load_result
     from .runtime.result.result import Result
     from .scene import Scene
     from .scene.load import load_scene
-    from .scene.robots.export import export_robot
-    from .scene.robots.files import import_robot
+    from .scene.robots.formats import import_robot
+    from .scene.robots.robot_from_scene import export_robot
 
 #: Public name -> (module, name there).
 _LAZY = {
     "Scene": (".scene", "Scene"),
     "load_scene": (".scene.load", "load_scene"),
-    "import_robot": (".scene.robots.files", "import_robot"),
-    "export_robot": (".scene.robots.export", "export_robot"),
-    "advise": (".bridge.advising", "advise"),
-    "chart": (".bridge.charting", "chart"),
-    "compile": (".bridge.compilation", "compile_scene"),
-    "register": (".bridge.compilation", "register"),
-    "equations": (".bridge.equations", "equations"),
-    "report": (".bridge.reporting.report", "report"),
-    "generate_file": (".bridge.compilation", "generate_file"),
-    "Advice": (".runtime.advice.record", "Advice"),
+    "import_robot": (".scene.robots.formats", "import_robot"),
+    "export_robot": (".scene.robots.robot_from_scene", "export_robot"),
+    "advise": (".pipeline.advise", "advise"),
+    "chart": (".pipeline.chart", "chart"),
+    "compile": (".pipeline.compilation", "compile_scene"),
+    "register": (".pipeline.compilation", "register"),
+    "equations": (".pipeline.equations", "equations"),
+    "write_report": (".pipeline.report.report", "write_report"),
+    "generate_file": (".pipeline.compilation", "generate_file"),
+    "Advice": (".runtime.advice.advice", "Advice"),
     "Chart": (".runtime.chart.chart", "Chart"),
     "Model": (".runtime.model.model", "Model"),
     "Result": (".runtime.result.result", "Result"),
-    "load_result": (".runtime.model.loading", "load_result"),
+    "load_result": (".runtime.model.result_loading", "load_result"),
     "stability": (".atlas.atlas", "stability"),
     "Atlas": (".atlas.atlas", "Atlas"),
 }
 
 __all__ = [
-    "Advice", "Atlas", "Chart", "ElementError", "EnvironmentFailure", "ExpressionError", "Model",
-    "MstmmError", "NumericalFailure", "Result", "RiskRefused", "Scene", "SceneError", "advise",
-    "chart", "compile", "equations", "export_robot", "generate_file", "import_robot", "load_result",
-    "load_scene", "register", "report", "stability",
+    "Advice",
+    "Atlas",
+    "Chart",
+    "ElementError",
+    "EnvironmentFailure",
+    "ExpressionError",
+    "Model",
+    "MstmmError",
+    "NumericalFailure",
+    "Result",
+    "RiskRefused",
+    "Scene",
+    "SceneError",
+    "advise",
+    "chart",
+    "compile",
+    "equations",
+    "export_robot",
+    "generate_file",
+    "import_robot",
+    "load_result",
+    "load_scene",
+    "register",
+    "stability",
+    "write_report",
 ]  # fmt: skip
 
 

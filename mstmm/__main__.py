@@ -7,9 +7,9 @@ import sys
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    from .cli.guard import leave
+    from .cli.error_boundary import run_and_exit
 
-    leave(sys.argv[1:])
+    run_and_exit(sys.argv[1:])
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ class SceneError(MstmmError):
     """Invalid scene (file or Python object) or argument; the message names file and key."""
 
 
-class OpenLoop(SceneError):
+class LoopClosureError(SceneError):
     """Loop that cannot be closed.
 
     `gap` is the largest position gap of a constraint row (m, rad or the unit of a coupling).
@@ -54,7 +54,7 @@ class NumericalFailure(MstmmError):
     exit_code = 4
 
 
-class UndeterminedMotion(NumericalFailure):
+class UndeterminedMotionError(NumericalFailure):
     """Undetermined acceleration of a hinge: the bodies it carries have no inertia there.
 
     `place` is the index of the hinge's body in the tree, -1 if unknown.

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from numbers import Real
 from typing import Any
 
-from .markup import Displayed, bullets, text
+from .notebook_html import NotebookDisplay, bullets, text
 
 #: Reactions of a run to its risks.
 ON_RISK = ("warn", "refuse", "ignore")
@@ -55,7 +55,7 @@ class Risk:
         return f"{self.means}; {self.remedy}"
 
 
-def advice(name: str, element: str, means: str, remedy: str) -> Risk:
+def information(name: str, element: str, means: str, remedy: str) -> Risk:
     """Create a risk that is information, no objection to the numbers."""
     return Risk(name, element, means, remedy, doubt=False)
 
@@ -71,9 +71,11 @@ def order_risks(found: Iterable[Risk]) -> tuple[Risk, ...]:
     A finding made both before and during a run keeps only the later row.
     """
     rows = tuple(dict.fromkeys(found))
-    seen = {(risk.name, risk.element) for risk in rows if not risk.before}
-    kept = (risk for risk in rows if not risk.before or (risk.name, risk.element) not in seen)
-    return tuple(sorted(kept, key=lambda risk: not risk.doubt))
+    run_keys = {(risk.name, risk.element) for risk in rows if not risk.before}
+    remaining = (
+        risk for risk in rows if not risk.before or (risk.name, risk.element) not in run_keys
+    )
+    return tuple(sorted(remaining, key=lambda risk: not risk.doubt))
 
 
 class DeferredRisks:
@@ -92,7 +94,7 @@ class DeferredRisks:
         return tuple, (tuple(self),)
 
 
-class Assessed(Displayed):
+class AssessedAnswer(NotebookDisplay):
     """Base class of answers that report their reliability.
 
     A subclass provides `findings`, the rows of its checks, in any order.
@@ -121,8 +123,8 @@ class Assessed(Displayed):
         objections = [risk for risk in self.risks if risk.doubt]
         if not objections:
             return "trusted: no check objects to it"
-        more = f" (and {len(objections) - 1} more)" if len(objections) > 1 else ""
-        return f"NOT trusted: {objections[0].means}{more}"
+        suffix = f" (and {len(objections) - 1} more)" if len(objections) > 1 else ""
+        return f"NOT trusted: {objections[0].means}{suffix}"
 
     def assessment(self) -> dict[str, Any]:
         """Verdict and risks as plain data, for files and JSON output."""
@@ -141,12 +143,12 @@ def to_rows(risks: Iterable[Risk]) -> list[dict[str, Any]]:
 
 def from_rows(rows: Iterable[Mapping[str, Any]]) -> tuple[Risk, ...]:
     """Restore risks from the result of `to_rows`.  TypeError for values of other types."""
-    found = tuple(Risk(**row) for row in rows)
-    for risk in found:
-        words = (risk.name, risk.element, risk.means, risk.remedy, risk.unit)
+    risks = tuple(Risk(**row) for row in rows)
+    for risk in risks:
+        texts = (risk.name, risk.element, risk.means, risk.remedy, risk.unit)
         numbers = (risk.figure, risk.limit)
-        if not all(isinstance(word, str) for word in words) or not all(
+        if not all(isinstance(word, str) for word in texts) or not all(
             x is None or isinstance(x, (int, float)) for x in (*numbers, risk.doubt, risk.before)
         ):
             raise TypeError("a risk holds values other than texts and numbers")
-    return found
+    return risks

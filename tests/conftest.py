@@ -29,7 +29,7 @@ settings.register_profile(
 settings.load_profile("mstmm")
 
 # The comparisons with other programs need those programs, which live in an environment of their
-# own (CONTRIBUTING.md, "Tests"); there `pytest tests/peers` runs them.
+# own (CONTRIBUTING.md, "Tests"); there `pytest tests/other_programs` runs them.
 collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["peers"]
 
 

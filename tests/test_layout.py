@@ -17,7 +17,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-from mstmm.runtime.libraries.build_extension import FOLDERS, PASTED
+from mstmm.runtime.libraries.build_extension import FOLDERS, INCLUDED_TEXT
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -25,7 +25,7 @@ SETUPTOOLS = PROJECT["tool"]["setuptools"]
 ROOMS = ("derive", "templates", "generated", "runtime")
 
 # The rooms of mstmm that join derivation and numbers, and the face that names what they offer.
-BRIDGES = {"atlas", "bridge", "cli"}
+BRIDGES = {"atlas", "cli", "pipeline"}
 
 
 def room_folder(package: str) -> Path:
@@ -147,7 +147,7 @@ def test_every_folder_of_c_is_built() -> None:
         for ending in ("*.c", "*.h")
         for path in (ROOT / room).rglob(ending)
     }
-    assert {*FOLDERS, PASTED} == found
+    assert {*FOLDERS, INCLUDED_TEXT} == found
     flags = (ROOT / "compile_flags.txt").read_text().split()
     assert {Path(flag[2:]) for flag in flags if flag.startswith("-I")} == found
 
@@ -206,7 +206,7 @@ def test_jinja_is_used_in_one_file() -> None:
         for _, name in imports(path)
         if name.split(".")[0] == "jinja2"
     }
-    assert users == {"derive/print/render.py"}
+    assert users == {"derive/codegen/template_rendering.py"}
 
 
 def test_import_contracts_hold() -> None:
@@ -255,7 +255,7 @@ def by_name(node: ast.AST) -> bool:
 
 
 def test_nothing_goes_by_the_name_of_a_hinge() -> None:
-    folders = ("runtime", "mstmm/scene", "mstmm/bridge", "derive")
+    folders = ("runtime", "mstmm/scene", "mstmm/pipeline", "derive")
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for folder in folders
@@ -277,12 +277,12 @@ def test_nothing_is_read_back_out_of_c() -> None:
     """A scene's numbers are in its System; C records are the business of one room."""
     found = {
         path.relative_to(ROOT).as_posix()
-        for folder in ("runtime", "mstmm/bridge")
+        for folder in ("runtime", "mstmm/pipeline")
         for path in python_files(folder)
         if READS_BACK.search(path.read_text())
     }
-    libraries = {"runtime/kernels/store.py"}  # hands a library's symbol on
-    assert not {one for one in found - libraries if not one.startswith("runtime/pack/records/")}
+    libraries = {"runtime/kernels/kernel_store.py"}  # hands a library's symbol on
+    assert not {one for one in found - libraries if not one.startswith("runtime/packing/records/")}
 
 
 def test_no_module_imports_itself_in_the_end() -> None:

@@ -8,7 +8,17 @@ from dataclasses import dataclass
 import mstmm
 
 from ..error_control.scenes import Drawn
-from .best import Single, Truth, cheapest, models, single, singles, timed, truth, truth_in_parts
+from .exhaustive_search import (
+    Single,
+    Truth,
+    cheapest,
+    models,
+    single,
+    singles,
+    timed,
+    truth,
+    truth_in_parts,
+)
 
 #: Errors that are asked for, in parts of the scene's length.
 ASKED = (1e-2, 1e-3, 1e-4)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import mstmm
 
-from .best import Reference, reference, timed
+from .cheapest_setting import Reference, reference, timed
 from .scenes import draw
 from .unseen_scenes import UNSEEN
 

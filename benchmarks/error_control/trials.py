@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import mstmm
 
-from .best import Reference, Single, reference, single, singles, timed
+from .cheapest_setting import Reference, Single, reference, single, singles, timed
 from .scenes import Drawn
 
 #: Errors that are asked for.

@@ -30,7 +30,7 @@ sys.path.insert(0, str(HERE.parent))
 from common import measure, mstmm_engines  # noqa: E402
 
 import mstmm  # noqa: E402
-from mstmm.runtime.engine.tangent import Tangent  # noqa: E402
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix  # noqa: E402
 
 SIZES = (10, 50, 200, 1000)
 #: Windows whose tangents are compared, as implicit steps take them.
@@ -137,7 +137,7 @@ def tangents(rounds: int) -> list[dict[str, Any]]:
 
 def factoring(model: mstmm.Model, r: np.ndarray, calls: int) -> Callable[[], None]:
     """So many tangents at the start, each with a solution."""
-    tangent = Tangent(model.looped)
+    tangent = TangentMatrix(model.looped)
     tangent.residual(0.0, *model.initial_state())
 
     def run() -> None:

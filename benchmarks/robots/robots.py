@@ -15,9 +15,9 @@ import numpy as np
 import pinocchio as pin
 
 import mstmm
-from mstmm.scene.robots.convert import Choices, Imported, converted
-from mstmm.scene.robots.robot import Robot
-from mstmm.scene.robots.urdf import read_urdf
+from mstmm.scene.robots.robot_model import Robot
+from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
+from mstmm.scene.robots.urdf_reader import read_urdf
 
 #: Name -> end of the file's path, and what its root stands on.
 ROBOTS = {
@@ -53,10 +53,10 @@ class Case:
         return ROBOTS[self.name][1]
 
     @cached_property
-    def imported(self) -> Imported:
+    def imported(self) -> ImportedRobot:
         """The robot as a scene; its joints in `held` are fixed."""
-        return converted(
-            self._bare(read_urdf(self.path.read_bytes(), self.name)), Choices(self.base)
+        return scene_from_robot(
+            self._bare(read_urdf(self.path.read_bytes(), self.name)), ImportOptions(self.base)
         )
 
     def _bare(self, robot: Robot) -> Robot:

@@ -54,14 +54,23 @@ def spent(command: list[str], cache: Path) -> dict[str, float]:
 def compiler(scene: dict[str, Any], folder: Path) -> list[str]:
     """The command of the compiler alone on the text of the scene's fused code."""
     import mstmm
-    from mstmm.border.fused import FLAGS
+    from mstmm.abi.fused_library import COMPILER_FLAGS
 
     model = mstmm.compile(mstmm.Scene(**scene), engine="fused")
     sources = model.fusion._sources("scalar", "0" * 64)
     for name, text in sources.items():
         (folder / name).write_text(text)
     files = [str(folder / name) for name in sources if name.endswith(".c")]
-    return ["gcc", *FLAGS, "-fPIC", "-shared", *files, "-o", str(folder / "alone.so"), "-lm"]
+    return [
+        "gcc",
+        *COMPILER_FLAGS,
+        "-fPIC",
+        "-shared",
+        *files,
+        "-o",
+        str(folder / "alone.so"),
+        "-lm",
+    ]
 
 
 def commands(folder: Path) -> dict[str, Callable[[], dict[str, float]]]:

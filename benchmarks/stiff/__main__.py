@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..common import measure
-from . import contestants, references
+from . import programs, references
 from .cases import CASES, Case
 from .counting import cheapest, evaluations, milliseconds
 
@@ -39,7 +39,7 @@ def say(what: str) -> None:
 def measured(case: Case, options: Namespace) -> dict[str, Any]:
     """All curves of one case, timed in alternating rounds."""
     exact, apart = references.load(case)
-    curves = contestants.of_case(case, options.methods.split(","), say)
+    curves = programs.of_case(case, options.methods.split(","), say)
     found = []
     for curve in curves:
         points = list(tried(curve, exact, options))
@@ -59,15 +59,13 @@ def measured(case: Case, options: Namespace) -> dict[str, Any]:
             "reference_apart_m": apart, "curves": found}  # fmt: skip
 
 
-def tried(
-    curve: contestants.Curve, exact: np.ndarray, options: Namespace
-) -> Iterator[dict[str, Any]]:
+def tried(curve: programs.Curve, exact: np.ndarray, options: Namespace) -> Iterator[dict[str, Any]]:
     """One point per setting, up to the first that takes longer than allowed (loose ones may, where
     they struggle) or the second that nobody asks to be so accurate."""
     accurate = 0
     for number, (tolerance, run) in enumerate(list(curve.settings)[:: 4 if options.quick else 1]):
         try:
-            box: list[contestants.Outcome] = []
+            box: list[programs.Outcome] = []
             spent = measure.cpu(lambda run=run, box=box: box.append(run()))
             look, counts = box[0]
             error = float(np.linalg.norm(look() - exact, axis=1).max())
@@ -124,7 +122,7 @@ def arguments() -> ArgumentParser:
     parser = measure.options(str(__doc__).splitlines()[0], HERE)
     parser.prog = "python -m benchmarks.stiff"
     parser.add_argument("case", nargs="*", help=f"of {', '.join(CASES)}; all unless given")
-    parser.add_argument("--methods", default=",".join(contestants.METHODS), help="mstmm's, by name")
+    parser.add_argument("--methods", default=",".join(programs.METHODS), help="mstmm's, by name")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--budget", type=float, default=2.0, help="CPU s per point in all rounds")
     parser.add_argument("--limit", type=float, default=5.0,

@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 import mstmm
-from mstmm.runtime.engine.engine import Engine
-from mstmm.runtime.engine.tangent import Tangent
+from mstmm.runtime.engine.looped_engine import LoopedEngine
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 
 from ..common import measure
 from . import scenes
@@ -60,7 +60,7 @@ def stream(rounds: int) -> float:
     return 1e9 * least({"sum": numbers.sum}, rounds)["sum"] / STREAM
 
 
-def numbers_a_body(engine: Engine, tangent: Tangent) -> dict[str, float]:
+def numbers_a_body(engine: LoopedEngine, tangent: TangentMatrix) -> dict[str, float]:
     """Bytes a body of what evaluations, and of what an iteration works on."""
     n = engine.packed.system.count
     more = tangent.work.nbytes + tangent.numbers.nbytes
@@ -70,14 +70,14 @@ def numbers_a_body(engine: Engine, tangent: Tangent) -> dict[str, float]:
 def chain(name: str, n: int, rounds: int) -> dict[str, Any]:
     """Nanoseconds a body of each pass."""
     model = mstmm.compile(mstmm.Scene(**CHAINS[name](n)), engine="looped")
-    engine, tangent = model.looped, Tangent(model.looped)
+    engine, tangent = model.looped, TangentMatrix(model.looped)
     random = np.random.default_rng(1)
     q, u = (np.asarray(x, float) for x in model.initial_state())
     q, a = q + 1e-6 * random.normal(size=q.shape), np.zeros(engine.nu)
     right, memory = random.normal(size=engine.nu), engine.start_memory()[None]
     tangent.residual(0.0, q, u, a)
     tangent.factor(SHARP, SHARP)
-    laws = Tangent(model.looped)
+    laws = TangentMatrix(model.looped)
     laws.residual(0.0, q, u, a)
     laws.factor_laws(SHARP, SHARP)
     calls: dict[str, Callable[[], object]] = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from ..print.render import generated_files, write_generated
-from .specs import all_facts, all_specs, on_demand_specs
+from ..codegen.template_rendering import generated_files, write_generated
+from .element_specs import all_facts, all_specs, on_demand_specs
 
 
 def regenerate(folder: Path | str) -> list[Path]:

@@ -13,24 +13,25 @@ from mstmm.ir import KernelIR
 
 from ..classical import harmonic_stiffness
 from ..classical.catalogue import CLASSICAL, classical_derivation, classical_guards
+from ..definition.derivation import Derivation, Equation, Quantity, vector
+from ..definition.element import Body, Hinge
 from ..elements.body_rigid import RigidBody
-from ..equations import body as body_kernels
 from ..equations import (
-    columns,
     constraints,
-    frames,
+    kinematics,
     laws,
-    loops,
-    qr,
-    screw,
-    sweep,
-    tangent,
-    tangent_hinge,
+    loop_closure,
+    multiple_right_hand_sides,
+    qr_sweep,
+    riccati_sweep,
+    screw_transport,
+    tangent_hinge_elimination,
+    tangent_sweep,
 )
-from ..equations import force as force_kernels
-from ..equations import tangent_placed as placed
-from ..equations.complement import complement
-from ..equations.factored import eliminate_factored, recover_factored
+from ..equations import force_element as force_kernels
+from ..equations import tangent_position_loads as placed
+from ..equations import user_body as body_kernels
+from ..equations.constrained_directions import complement
 from ..equations.hinge import (
     HingeMotion,
     hinge_derivation,
@@ -38,37 +39,72 @@ from ..equations.hinge import (
     motion_of,
     place_of,
 )
-from ..equations.links import axial, turning
-from ..flexible import beam_fields, beam_second_order, modal, modal_rows, modal_sweep, section
-from ..language.derivation import Derivation, Equation, Quantity, vector
-from ..language.element import Body, Hinge
-from ..lower.kernel import lower
+from ..equations.ldl_elimination import eliminate_factored, recover_factored
+from ..equations.links import axial, rotational
+from ..flexible import (
+    beam_fields,
+    beam_foreshortening,
+    modal_constraint_rows,
+    modal_residual,
+    modal_sweep,
+    section,
+)
+from ..lower.kernel_lowering import lower
 from .registry import Element, builtin_elements, kind_of
 
 #: (condition, failure code, message) over the derivation's quantities.
 Guards = tuple[tuple[sp.Basic, int, str], ...]
 
 FRAME_DERIVATIONS = (
-    frames.pose, frames.velocity, frames.point, frames.turning, frames.end_frame,
-    frames.applied_load, frames.opposite, frames.power, frames.momentum, frames.carried_momentum,
-    frames.gravity_energy,
-    frames.pivot_floor, frames.reaction, frames.moment_at, frames.transport, frames.rotor_energy,
-    frames.driven_effort, frames.speed_power, frames.length, frames.turned,
-    frames.classical_body, frames.state_deviation,
-    tangent.tangent_carry, tangent.tangent_moved, tangent_hinge.tangent_turned,
-    tangent.tangent_known,
-    placed.placed_moved, placed.placed_pose, placed.placed_column, placed.placed_carry,
+    kinematics.pose,
+    kinematics.velocity,
+    kinematics.point,
+    kinematics.turning,
+    kinematics.end_frame,
+    kinematics.applied_load,
+    kinematics.opposite,
+    kinematics.power,
+    kinematics.momentum,
+    kinematics.carried_momentum,
+    kinematics.gravity_energy,
+    kinematics.pivot_floor,
+    kinematics.reaction,
+    kinematics.moment_at,
+    kinematics.transport,
+    kinematics.rotor_energy,
+    kinematics.driven_effort,
+    kinematics.speed_power,
+    kinematics.length,
+    kinematics.turned,
+    kinematics.classical_body,
+    kinematics.state_deviation,
+    tangent_sweep.tangent_carry,
+    tangent_sweep.tangent_moved,
+    tangent_hinge_elimination.tangent_turned,
+    tangent_sweep.tangent_known,
+    placed.placed_moved,
+    placed.placed_pose,
+    placed.placed_column,
+    placed.placed_carry,
     placed.placed_known,
-)  # fmt: skip
+)
 
 #: Steps of the tangent for hinges with any number of speeds, and for those that have some.
-_ALONG_HINGES = (tangent_hinge.tangent_carrier, tangent_hinge.tangent_column)
+_ALONG_HINGES = (
+    tangent_hinge_elimination.tangent_carrier,
+    tangent_hinge_elimination.tangent_column,
+)
 _OF_SPEEDS = (
-    tangent_hinge.tangent_along, tangent_hinge.tangent_steady, tangent_hinge.tangent_turning,
-    tangent_hinge.tangent_rows, tangent_hinge.tangent_reduce, tangent_hinge.tangent_push,
-    tangent_hinge.tangent_answer, tangent_hinge.tangent_push_known,
-    tangent_hinge.tangent_answer_known,
-)  # fmt: skip
+    tangent_hinge_elimination.tangent_along,
+    tangent_hinge_elimination.tangent_steady,
+    tangent_hinge_elimination.tangent_turning,
+    tangent_hinge_elimination.tangent_rows,
+    tangent_hinge_elimination.tangent_reduce,
+    tangent_hinge_elimination.tangent_push,
+    tangent_hinge_elimination.tangent_answer,
+    tangent_hinge_elimination.tangent_push_known,
+    tangent_hinge_elimination.tangent_answer_known,
+)
 
 #: Largest number of speeds of a hinge.
 MAX_SPEEDS = 6
@@ -108,13 +144,13 @@ def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
     subspace, nu = motion.in_arrays(motion.subspace), motion.nu
     kernels = [
         Kernel("hinge", hinge_derivation(motion)),
-        Kernel("forward", sweep.forward(motion, inputs)),
+        Kernel("forward", riccati_sweep.forward(motion, inputs)),
         Kernel(
             "condense",
-            sweep.condense(nu, subspace, inputs[:2], hinge.name),
-            sweep.pivot_guards(nu, subspace),
+            riccati_sweep.condense(nu, subspace, inputs[:2], hinge.name),
+            riccati_sweep.pivot_guards(nu, subspace),
         ),
-        Kernel("recover", sweep.recover(nu, subspace, inputs[:2], hinge.name)),
+        Kernel("recover", riccati_sweep.recover(nu, subspace, inputs[:2], hinge.name)),
     ]
     if nu:
         kernels.append(
@@ -141,21 +177,21 @@ def _singularity(motion: HingeMotion, measure: sp.Expr) -> Derivation:
 def generic_kernels(nu: int) -> tuple[Kernel, ...]:
     """The sweep's steps for any hinge with `nu` free speeds."""
     return (
-        Kernel("forward", sweep.forward_generic(nu)),
-        Kernel("condense", sweep.condense(nu), sweep.pivot_guards(nu)),
-        Kernel("recover", sweep.recover(nu)),
-        Kernel("effort", sweep.effort(nu)),
-        Kernel("project", sweep.project(nu)),
-        Kernel("factor", columns.factor(nu), sweep.pivot_guards(nu)),
-        Kernel("push", columns.push(nu)),
-        Kernel("answer", columns.answer(nu)),
-        Kernel("qr_eliminate", qr.qr_eliminate(nu), qr.qr_guards(nu)),
+        Kernel("forward", riccati_sweep.forward_generic(nu)),
+        Kernel("condense", riccati_sweep.condense(nu), riccati_sweep.pivot_guards(nu)),
+        Kernel("recover", riccati_sweep.recover(nu)),
+        Kernel("effort", riccati_sweep.effort(nu)),
+        Kernel("project", riccati_sweep.project(nu)),
+        Kernel("factor", multiple_right_hand_sides.factor(nu), riccati_sweep.pivot_guards(nu)),
+        Kernel("push", multiple_right_hand_sides.push(nu)),
+        Kernel("answer", multiple_right_hand_sides.answer(nu)),
+        Kernel("qr_eliminate", qr_sweep.qr_eliminate(nu), qr_sweep.qr_guards(nu)),
         *(Kernel(make.__name__, make(nu)) for make in _ALONG_HINGES),
         *(Kernel(make.__name__, make(nu)) for make in _OF_SPEEDS if nu),
         Kernel("complement", complement(nu)),
-        *(Kernel(make.__name__, make(nu)) for make in loops.OF_SPEEDS if nu),
-        *((Kernel("exerted", sweep.exerted(nu)),) if nu else ()),
-        *((Kernel("push_on_ground", columns.push_on_ground(nu)),) if nu else ()),
+        *(Kernel(make.__name__, make(nu)) for make in loop_closure.OF_SPEEDS if nu),
+        *((Kernel("exerted", riccati_sweep.exerted(nu)),) if nu else ()),
+        *((Kernel("push_on_ground", multiple_right_hand_sides.push_on_ground(nu)),) if nu else ()),
         *((Kernel("eliminate", eliminate_factored(nu)),) if nu else ()),
         *((Kernel("recover_factored", recover_factored(nu)),) if nu else ()),
     )
@@ -178,13 +214,16 @@ def law_kernels() -> tuple[Kernel, ...]:
 
 def screw_kernels() -> tuple[Kernel, ...]:
     """Transport across axial screws."""
-    return tuple(Kernel(name, derivation) for name, derivation in screw.derivations().items())
+    return tuple(
+        Kernel(name, derivation) for name, derivation in screw_transport.derivations().items()
+    )
 
 
 def qr_kernels() -> tuple[Kernel, ...]:
     """The sweep as least squares, but for the elimination of hinges."""
     return tuple(
-        Kernel(make.__name__, make()) for make in (qr.factor, qr.bias, qr.merge, qr.restored)
+        Kernel(make.__name__, make())
+        for make in (qr_sweep.factor, qr_sweep.bias, qr_sweep.merge, qr_sweep.restored)
     )
 
 
@@ -192,7 +231,7 @@ def loop_kernels() -> tuple[Kernel, ...]:
     """Closed loops, but for what goes by the speeds of a hinge."""
     return tuple(
         Kernel(make.__name__, make(), constraints.GUARDS.get(make.__name__, ()))
-        for make in (*loops.STEPS, *constraints.STEPS)
+        for make in (*loop_closure.STEPS, *constraints.STEPS)
     )
 
 
@@ -202,7 +241,7 @@ def links() -> Mapping[str, Hinge]:
     hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
     return {
         hinge.name: hinge for hinge in hinges
-        if _axial(hinge) or turning.turns_about_a_point(hinge)
+        if _axial(hinge) or rotational.turns_about_a_point(hinge)
     }  # fmt: skip
 
 
@@ -227,13 +266,15 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
     """A rigid body behind a hinge, pass by pass; `name` is one of `link_names`."""
     hinge, rotor, body = links()[name.removesuffix(ROTOR)], name.endswith(ROTOR), RigidBody()
     motion = motion_of(hinge)
-    guards = sweep.pivot_guards(motion.nu, motion.in_arrays(motion.subspace), axial.floor(body))
-    if turning.turns_about_a_point(hinge):
+    guards = riccati_sweep.pivot_guards(
+        motion.nu, motion.in_arrays(motion.subspace), axial.floor(body)
+    )
+    if rotational.turns_about_a_point(hinge):
         return (
-            Kernel("turn", turning.turn(motion)),
-            Kernel("forward", turning.forward(motion, body)),
-            Kernel("condense", turning.condense(motion, body), guards),
-            Kernel("recover", turning.recover(motion)),
+            Kernel("turn", rotational.turn(motion)),
+            Kernel("forward", rotational.forward(motion, body)),
+            Kernel("condense", rotational.condense(motion, body), guards),
+            Kernel("recover", rotational.recover(motion)),
         )
     return (
         Kernel("turn", axial.turn(motion)),
@@ -247,15 +288,18 @@ def modal_kernels() -> tuple[Kernel, ...]:
     """Flexible bodies: residual, sections, condensation; n modes, known at run time."""
     turns = section.turn_guards()
     return (
-        Kernel("residual", modal.residual()),
-        Kernel("momentum", modal.momentum()),
-        Kernel("strain_energy", modal.strain_energy()),
+        Kernel("residual", modal_residual.residual()),
+        Kernel("momentum", modal_residual.momentum()),
+        Kernel("strain_energy", modal_residual.strain_energy()),
         Kernel("section", section.section()),
         Kernel("outward", section.outward(), turns),
         Kernel("inward", section.inward(), turns),
         Kernel("subspace", section.subspace()),
         Kernel("imposed", section.imposed()),
-        *(Kernel(step.__name__, step()) for step in (*modal_sweep.STEPS, *modal_rows.STEPS)),
+        *(
+            Kernel(step.__name__, step())
+            for step in (*modal_sweep.STEPS, *modal_constraint_rows.STEPS)
+        ),
     )
 
 
@@ -263,17 +307,29 @@ def tangent_kernels() -> tuple[Kernel, ...]:
     """Elimination of the unknowns of an implicit step: n of a hinge or of a flexible body."""
     return tuple(
         Kernel(make.__name__, make())
-        for make in (tangent.invert, tangent.node, tangent.absorb, tangent.push, tangent.answer,
-                     tangent.displaced, tangent.lag, tangent.lagged, placed.placed_rows,
-                     placed.placed_own, placed.placed_reduce, placed.placed_node,
-                     placed.placed_absorb, placed.placed_left)
-    )  # fmt: skip
+        for make in (
+            tangent_sweep.invert,
+            tangent_sweep.node,
+            tangent_sweep.absorb,
+            tangent_sweep.push,
+            tangent_sweep.answer,
+            tangent_sweep.displaced,
+            tangent_sweep.lag,
+            tangent_sweep.lagged,
+            placed.placed_rows,
+            placed.placed_own,
+            placed.placed_reduce,
+            placed.placed_node,
+            placed.placed_absorb,
+            placed.placed_left,
+        )
+    )
 
 
 def beam_kernels() -> tuple[Kernel, ...]:
     """Beams: integrands per length, integrated along the beam when a scene is packed; dynamic
     stiffness of vibrating ones."""
-    derivations = beam_fields.KERNELS | beam_second_order.KERNELS | harmonic_stiffness.KERNELS
+    derivations = beam_fields.KERNELS | beam_foreshortening.KERNELS | harmonic_stiffness.KERNELS
     return tuple(Kernel(name, make()) for name, make in derivations.items())
 
 

@@ -11,12 +11,12 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
 
-from mstmm.arguments import path_of
+from mstmm.argument_validation import require_path
 from mstmm.errors import ElementError
-from mstmm.ir.spec import ENTRY_POINTS
+from mstmm.ir.element_spec import ENTRY_POINTS
 
 from .. import elements
-from ..language.element import Body, ForceElement, Hinge
+from ..definition.element import Body, ForceElement, Hinge
 
 Element = Hinge | Body | ForceElement
 KINDS: tuple[tuple[str, type], ...] = (("hinge", Hinge), ("body", Body), ("force", ForceElement))
@@ -102,7 +102,7 @@ def load_file(path: str | Path) -> list[Element]:
 
     Raises ElementError if the file cannot be run, defines no element, or one twice.
     """
-    path = path_of("elements", path)
+    path = require_path("elements", path)
     if not path.is_file():
         raise ElementError(f"{path}: no such file")
     name = f"mstmm_user_{path.stem}"
@@ -149,7 +149,7 @@ def _distinct(found: list[Element]) -> list[Element]:
     return found
 
 
-def published() -> list[tuple[str, list[Element]]]:
+def installed_elements() -> list[tuple[str, list[Element]]]:
     """(distribution, its elements) of the packages that publish elements by entry points.
 
     Their modules are imported.  Raises ElementError naming the package that fails.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, vector
-from ..language.notation import Perp
-from .state import BOOK, PLANAR, force_scale, transfer_matrix
+from ..definition.derivation import Derivation, Equation, Quantity, vector
+from ..definition.notation import Perp
+from .state_vector import BOOK, PLANAR, force_scale, transfer_matrix
 
 MASS = sp.MatrixSymbol("M", 1, 1)
 OUTPUT, CENTER = vector("r_IO", 2), vector("r_IC", 2)

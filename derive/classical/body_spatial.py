@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
-from ..language.notation import Tilde, explicit
-from .state import BOOK, SPATIAL, force_scale, transfer_matrix
+from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..definition.notation import Tilde, explicit
+from .state_vector import BOOK, SPATIAL, force_scale, transfer_matrix
 
 MASS = sp.MatrixSymbol("M", 1, 1)
 OUTPUT, CENTER = vector("r_IO", 3), vector("r_IC", 3)

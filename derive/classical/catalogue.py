@@ -11,17 +11,17 @@ from functools import cache
 
 import sympy as sp
 
-from mstmm.ir.spec import ElementSpec
+from mstmm.ir.element_spec import ElementSpec
 
-from ..language.derivation import Derivation
-from ..lower.kernel import lower
-from . import acceleration, ball, body_planar, body_spatial, pin_planar, pin_spatial
-from .discrete.catalogue import FLEXIBLE, STEPPED
-from .hinge_relation import guards
+from ..definition.derivation import Derivation
+from ..lower.kernel_lowering import lower
+from . import acceleration_hinge, ball_hinge, body_planar, body_spatial, pin_planar, pin_spatial
+from .discrete.catalogue import DISCRETE_DERIVATIONS, STEPPING_ELEMENTS
+from .hinge_relation import pivot_guards
 
 
 def _planar_acceleration() -> Derivation:
-    return acceleration.derivation(acceleration.PLANAR_DIRECTIONS, planar=True)
+    return acceleration_hinge.derivation(acceleration_hinge.PLANAR_DIRECTIONS, planar=True)
 
 
 #: Name -> derivation of the classical elements.
@@ -29,22 +29,22 @@ CLASSICAL: dict[str, Callable[[], Derivation]] = {
     "body_planar": body_planar.derivation,
     "body_spatial": body_spatial.derivation,
     "pin_planar": pin_planar.derivation,
-    "ball": ball.derivation,
+    "ball": ball_hinge.derivation,
     "pin_spatial": pin_spatial.derivation,
-    "acceleration": acceleration.derivation,
+    "acceleration": acceleration_hinge.derivation,
     "acceleration_planar": _planar_acceleration,
-    **FLEXIBLE,
+    **DISCRETE_DERIVATIONS,
 }
 
 #: Elements whose matrices a run multiplies, for `sweep = "product"` and for the discrete-time
 #: method.  They are generated and compiled; the others are derived on demand.
-RUN = ("body_spatial", "pin_spatial", "ball", "acceleration", *STEPPED)
+RUN_ELEMENTS = ("body_spatial", "pin_spatial", "ball", "acceleration", *STEPPING_ELEMENTS)
 
 
 def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
     """Guards of a classical element: the pivot's for a hinge, none for a body."""
     has_margin = any(quantity.name == "margin" for quantity in derivation.outputs)
-    return guards(derivation) if has_margin else ()
+    return pivot_guards(derivation) if has_margin else ()
 
 
 @cache

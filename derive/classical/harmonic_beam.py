@@ -27,15 +27,15 @@ def field_matrix() -> sp.ImmutableMatrix:
 
 def mass_matrix(ratio: sp.Expr) -> sp.ImmutableMatrix:
     """Of a point mass of `ratio` = m / (rho A): its inertia acts as the beam's own does."""
-    return _shear(ratio * BETA**4)
+    return _shear_matrix(ratio * BETA**4)
 
 
 def spring_matrix(ratio: sp.Expr) -> sp.ImmutableMatrix:
     """Of a spring to the ground, across the beam, of `ratio` = k / (E I)."""
-    return _shear(-ratio)
+    return _shear_matrix(-ratio)
 
 
-def _shear(by: sp.Expr) -> sp.ImmutableMatrix:
+def _shear_matrix(by: sp.Expr) -> sp.ImmutableMatrix:
     matrix = sp.eye(4)
     matrix[3, 0] = by
     return sp.ImmutableMatrix(matrix)

@@ -28,8 +28,8 @@ from functools import cache
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, vector
-from ..language.notation import Matrix
+from ..definition.derivation import Derivation, Equation, Quantity, vector
+from ..definition.notation import Matrix
 from .harmonic_beam import BETA, LENGTH, field_matrix
 
 _Z = sp.Symbol("z", positive=True)
@@ -43,7 +43,7 @@ _DERIVATIVES = {
 _CIRCULAR = {sp.cos(_Z): _COS, sp.sin(_Z): _SIN}
 #: Terms of the power series beyond the first two, |zeta| up to which it is taken: there
 #: the last one is below rounding, zeta being 500 at the first pole of the beam and 10 of the rod.
-_TERMS, _NEAR_BEAM, _NEAR_ROD = 8, 5, sp.Rational(1, 10)
+_SERIES_TERM_COUNT, _MAX_SERIES_ZETA_BEAM, _MAX_SERIES_ZETA_ROD = 8, 5, sp.Rational(1, 10)
 
 ZETA = Quantity(vector("zeta", 2), "", "real and imaginary part of zeta")
 SOURCES = (
@@ -57,17 +57,17 @@ def beam_stiffness() -> tuple[sp.ImmutableMatrix, sp.Expr]:
     """N (4, 4) and its divisor d of D = N / d for (w, w') at root and tip."""
     field = field_matrix().subs({BETA: _Z, LENGTH: 1})
     loads = sp.Matrix([[0, 1], [-1, 0]])
-    return _between_ends(field, loads, 2 * _Z**4)
+    return _stiffness_from_field_matrix(field, loads, 2 * _Z**4)
 
 
 @cache
 def rod_stiffness() -> tuple[sp.ImmutableMatrix, sp.Expr]:
     """N (2, 2) and its divisor d of D = N / d for u at root and tip."""
     field = sp.Matrix([[sp.cos(_Z), sp.sin(_Z) / _Z], [-_Z * sp.sin(_Z), sp.cos(_Z)]])
-    return _between_ends(field, sp.Matrix([[-1]]), _Z)
+    return _stiffness_from_field_matrix(field, sp.Matrix([[-1]]), _Z)
 
 
-def _between_ends(
+def _stiffness_from_field_matrix(
     field: Matrix, loads: Matrix, scale: sp.Expr
 ) -> tuple[sp.ImmutableMatrix, sp.Expr]:
     """Loads on both ends by their displacements, as numerators over `scale` det U_dp; `loads`
@@ -76,39 +76,46 @@ def _between_ends(
     dd, dp, pd, pp = field[:m, :m], field[:m, m:], field[m:, :m], field[m:, m:]
     root = sp.Matrix.hstack(-dp.adjugate() * dd, dp.adjugate())
     tip = sp.Matrix.hstack(pd * dp.det(), sp.zeros(m)) + pp * root
-    whole = sp.Matrix.vstack(loads * root, -loads * tip)
-    numerator = whole.applyfunc(lambda entry: _reduced(scale * entry))
-    return sp.ImmutableMatrix(numerator), _reduced(scale * dp.det())
+    loads_by_displacements = sp.Matrix.vstack(loads * root, -loads * tip)
+    numerator = loads_by_displacements.applyfunc(lambda entry: _reduce_polynomial(scale * entry))
+    return sp.ImmutableMatrix(numerator), _reduce_polynomial(scale * dp.det())
 
 
-def _reduced(expression: sp.Expr) -> sp.Expr:
+def _reduce_polynomial(expression: sp.Expr) -> sp.Expr:
     """A polynomial of z, cosh z, sinh z, cos z and sin z without their known squares."""
     symbols = {name(_Z): sp.Dummy(str(name)) for name in _DERIVATIVES}
-    ch, sh, co, si = symbols.values()
-    known = [ch**2 - sh**2 - 1, co**2 + si**2 - 1]
+    cosh_, sinh_, cos_, sin_ = symbols.values()
+    identities = [cosh_**2 - sinh_**2 - 1, cos_**2 + sin_**2 - 1]
     polynomial = sp.expand(expression.xreplace(symbols))
-    _, rest = sp.reduced(polynomial, known, *symbols.values())
-    return rest.xreplace({symbol: function for function, symbol in symbols.items()})
+    _, remainder = sp.reduced(polynomial, identities, *symbols.values())
+    return remainder.xreplace({symbol: function for function, symbol in symbols.items()})
 
 
 # --- near zeta = 0 --------------------------------------------------------------------------------
 
 
 @cache
-def _beyond(numerator: sp.Expr, divisor: sp.Expr, order: int) -> list[sp.Rational]:
+def _series_coefficients(numerator: sp.Expr, divisor: sp.Expr, order: int) -> list[sp.Rational]:
     """Coefficients of zeta^0, zeta^1, ... of a quotient, zeta = z^order."""
-    count = order * (_TERMS + 2)
-    above, below = (_taylor(x, count + 5) for x in (numerator, divisor))
-    first = next(k for k, x in enumerate(below) if x)
-    above, below = above[first:], below[first:]
-    found: list[sp.Rational] = []
+    count = order * (_SERIES_TERM_COUNT + 2)
+    numerator_series, divisor_series = (
+        _taylor_coefficients(x, count + 5) for x in (numerator, divisor)
+    )
+    leading_index = next(k for k, x in enumerate(divisor_series) if x)
+    numerator_series, divisor_series = (
+        numerator_series[leading_index:],
+        divisor_series[leading_index:],
+    )
+    coefficients: list[sp.Rational] = []
     for k in range(count):
-        known = sum((found[j] * below[k - j] for j in range(k)), sp.Integer(0))
-        found.append((above[k] - known) / below[0])
-    return found[::order]
+        convolution = sum(
+            (coefficients[j] * divisor_series[k - j] for j in range(k)), sp.Integer(0)
+        )
+        coefficients.append((numerator_series[k] - convolution) / divisor_series[0])
+    return coefficients[::order]
 
 
-def _taylor(expression: sp.Expr, count: int) -> list[sp.Rational]:
+def _taylor_coefficients(expression: sp.Expr, count: int) -> list[sp.Rational]:
     """Coefficients of the powers of z up to `count`."""
     symbols = {name(_Z): sp.Dummy(str(name)) for name in _DERIVATIVES}
     total = sp.Poly(0, _Z)
@@ -116,13 +123,13 @@ def _taylor(expression: sp.Expr, count: int) -> list[sp.Rational]:
         term = sp.Poly(factor * _Z ** powers[0], _Z)
         for name, power in zip(_DERIVATIVES, powers[1:], strict=True):
             for _ in range(power):
-                term = term * _truncated(name, count)
+                term = term * _function_series(name, count)
         total = total + term
     return [total.coeff_monomial(_Z**k) for k in range(count)]
 
 
 @cache
-def _truncated(name: type[sp.Function], count: int) -> sp.Poly:
+def _function_series(name: type[sp.Function], count: int) -> sp.Poly:
     """The power series of a function, whose derivatives at 0 repeat."""
     cycle = _DERIVATIVES[name]
     terms = (cycle[k % 4] * _Z**k / sp.factorial(k) for k in range(count))
@@ -134,15 +141,15 @@ def _truncated(name: type[sp.Function], count: int) -> sp.Poly:
 Pair = tuple[sp.Expr, sp.Expr]
 
 
-def _pair(symbol: sp.MatrixSymbol) -> Pair:
+def _complex_parts(symbol: sp.MatrixSymbol) -> Pair:
     return symbol[0, 0], symbol[1, 0]
 
 
-def _times(a: Pair, b: Pair) -> Pair:
+def _complex_product(a: Pair, b: Pair) -> Pair:
     return a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]
 
 
-def _polynomial(expression: sp.Expr, values: dict[sp.Symbol, Pair]) -> Pair:
+def _evaluate_polynomial(expression: sp.Expr, values: dict[sp.Symbol, Pair]) -> Pair:
     """A polynomial of complex symbols in parts."""
     total: Pair = (sp.Integer(0), sp.Integer(0))
     symbols = list(values)
@@ -150,81 +157,91 @@ def _polynomial(expression: sp.Expr, values: dict[sp.Symbol, Pair]) -> Pair:
         term: Pair = (coefficient, sp.Integer(0))
         for symbol, power in zip(symbols, powers, strict=True):
             for _ in range(power):
-                term = _times(term, values[symbol])
+                term = _complex_product(term, values[symbol])
         total = (total[0] + term[0], total[1] + term[1])
     return total
 
 
-def _series(coefficients: Sequence[sp.Expr], zeta: Pair) -> Pair:
+def _evaluate_series(coefficients: Sequence[sp.Expr], zeta: Pair) -> Pair:
     """sum c_k zeta^k from k = 1 on, in Horner's form."""
     value: Pair = (sp.Integer(0), sp.Integer(0))
     for coefficient in reversed(coefficients[1:]):
-        value = _times(value, zeta)
+        value = _complex_product(value, zeta)
         value = (value[0] + coefficient, value[1])
-    return _times(value, zeta)
+    return _complex_product(value, zeta)
 
 
-_ROOT, _NUMBERS = vector("z", 2), vector("f", 6)
+_ROOT, _FUNCTION_VALUES = vector("z", 2), vector("f", 6)
 
 
-def _functions(order: int) -> tuple[Equation, ...]:
+def _function_values(order: int) -> tuple[Equation, ...]:
     """z, and exp(-z), cos z and sin z in parts."""
-    a, b = _pair(ZETA.symbol)
+    a, b = _complex_parts(ZETA.symbol)
     size, turn = sp.sqrt(a**2 + b**2), sp.atan2(b, a) / order
     radius = sp.sqrt(sp.sqrt(size)) if order == 4 else sp.sqrt(size)
-    x, y = _pair(_ROOT)
-    up, down, decay = sp.exp(y), sp.exp(-y), sp.exp(-x)
-    wide, steep = (up + down) / 2, (up - down) / 2
+    x, y = _complex_parts(_ROOT)
+    growing, falling, decay = sp.exp(y), sp.exp(-y), sp.exp(-x)
+    cosh_y, sinh_y = (growing + falling) / 2, (growing - falling) / 2
     values = [
-        decay * sp.cos(y), -decay * sp.sin(y), sp.cos(x) * wide, -sp.sin(x) * steep,
-        sp.sin(x) * wide, sp.cos(x) * steep,
+        decay * sp.cos(y), -decay * sp.sin(y), sp.cos(x) * cosh_y, -sp.sin(x) * sinh_y,
+        sp.sin(x) * cosh_y, sp.cos(x) * sinh_y,
     ]  # fmt: skip
     root = [radius * sp.cos(turn), radius * sp.sin(turn)]
     return (
         Equation("z", _ROOT, sp.ImmutableDenseMatrix(root)),
-        Equation("exp(-z), cos z, sin z", _NUMBERS, sp.ImmutableDenseMatrix(values)),
+        Equation("exp(-z), cos z, sin z", _FUNCTION_VALUES, sp.ImmutableDenseMatrix(values)),
     )
 
 
-def _kernel(title: str, parts: tuple[sp.ImmutableMatrix, sp.Expr], order: int, near: sp.Expr,
-            scale: sp.Expr) -> Derivation:  # fmt: skip
+def _stiffness_derivation(
+    title: str, parts: tuple[sp.ImmutableMatrix, sp.Expr], order: int, near: sp.Expr, scale: sp.Expr
+) -> Derivation:
     """D less its term of order 0; `scale` times numerator and divisor has no cosh."""
     numerator, divisor = parts
     size = numerator.rows
-    values = {s: (_NUMBERS[2 * k, 0], _NUMBERS[2 * k + 1, 0])
-              for k, s in enumerate((_DECAY, _COS, _SIN))} | {_Z: _pair(_ROOT)}  # fmt: skip
+    values = {
+        s: (_FUNCTION_VALUES[2 * k, 0], _FUNCTION_VALUES[2 * k + 1, 0])
+        for k, s in enumerate((_DECAY, _COS, _SIN))
+    } | {_Z: _complex_parts(_ROOT)}
 
     def in_parts(expression: sp.Expr) -> Pair:
-        return _polynomial((expression.xreplace(_HYPERBOLIC) * scale).xreplace(_CIRCULAR), values)
+        return _evaluate_polynomial(
+            (expression.xreplace(_HYPERBOLIC) * scale).xreplace(_CIRCULAR), values
+        )
 
-    below, quotient = vector("d", 2), vector("inverse", 2)
-    d = _pair(below)
+    divisor_symbol, quotient = vector("d", 2), vector("inverse", 2)
+    d = _complex_parts(divisor_symbol)
     square = d[0] ** 2 + d[1] ** 2
     inverse = [d[0] / square, -d[1] / square]
-    zeta = _pair(ZETA.symbol)
-    close = zeta[0] ** 2 + zeta[1] ** 2 < near**2
+    zeta = _complex_parts(ZETA.symbol)
+    is_near = zeta[0] ** 2 + zeta[1] ** 2 < near**2
     real, imaginary = sp.zeros(size), sp.zeros(size)
     for i in range(size):
         for j in range(i, size):
-            above, known = numerator[i, j], _beyond(numerator[i, j], divisor, order)
-            far = _times(in_parts(above), _pair(quotient))
-            far = (far[0] - known[0], far[1])
-            small = _series(known, zeta)
-            real[i, j] = real[j, i] = sp.Piecewise((small[0], close), (far[0], True))
-            imaginary[i, j] = imaginary[j, i] = sp.Piecewise((small[1], close), (far[1], True))
+            above, coefficients = (
+                numerator[i, j],
+                _series_coefficients(numerator[i, j], divisor, order),
+            )
+            far_value = _complex_product(in_parts(above), _complex_parts(quotient))
+            far_value = (far_value[0] - coefficients[0], far_value[1])
+            near_value = _evaluate_series(coefficients, zeta)
+            real[i, j] = real[j, i] = sp.Piecewise((near_value[0], is_near), (far_value[0], True))
+            imaginary[i, j] = imaginary[j, i] = sp.Piecewise(
+                (near_value[1], is_near), (far_value[1], True)
+            )
     re, im = sp.MatrixSymbol("D_re", size, size), sp.MatrixSymbol("D_im", size, size)
     return Derivation(
         "beam",
         title,
         (ZETA,),
         (
-            Quantity(below, "", "the divisor, with the sign of that of D"),
+            Quantity(divisor_symbol, "", "the divisor, with the sign of that of D"),
             Quantity(re, "", "real part, in the stiffness of the element", symmetric=True),
             Quantity(im, "", "imaginary part", symmetric=True),
         ),
         (
-            *_functions(order),
-            Equation("divisor", below, sp.ImmutableDenseMatrix(list(in_parts(divisor)))),
+            *_function_values(order),
+            Equation("divisor", divisor_symbol, sp.ImmutableDenseMatrix(list(in_parts(divisor)))),
             Equation("1 / divisor", quotient, sp.ImmutableDenseMatrix(inverse)),
             Equation("Re D", re, sp.ImmutableDenseMatrix(real), symmetric=True),
             Equation("Im D", im, sp.ImmutableDenseMatrix(imaginary), symmetric=True),
@@ -236,13 +253,13 @@ def _kernel(title: str, parts: tuple[sp.ImmutableMatrix, sp.Expr], order: int, n
 def harmonic_bending() -> Derivation:
     """Dynamic stiffness of bending beyond the static one."""
     title = "dynamic stiffness of a bending beam, less the static one"
-    return _kernel(title, beam_stiffness(), 4, _NEAR_BEAM, _DECAY)
+    return _stiffness_derivation(title, beam_stiffness(), 4, _MAX_SERIES_ZETA_BEAM, _DECAY)
 
 
 def harmonic_rod() -> Derivation:
     """Dynamic stiffness of tension or twist beyond the static one."""
     title = "dynamic stiffness of a rod, less the static one"
-    return _kernel(title, rod_stiffness(), 2, _NEAR_ROD, sp.Integer(1))
+    return _stiffness_derivation(title, rod_stiffness(), 2, _MAX_SERIES_ZETA_ROD, sp.Integer(1))
 
 
 #: Name -> derivation of the kernels.

@@ -8,7 +8,7 @@ hinge z_O = E z_I + G alpha and the force rows F of the outboard body's transfer
 
 The pivot L F G depends on one body only and may vanish in systems that are perfectly regular.
 `margin` measures how close it is: 1 / |(L F G)^-1| (|L| F_scale |G|) in the row-sum norm, at most
-about 1, and zero when the pivot vanishes.  `guards` leaves the kernel below `PIVOT_LIMIT`.
+about 1, and zero when the pivot vanishes.  `pivot_guards` leaves the kernel below `PIVOT_LIMIT`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, Solve
-from ..language.notation import Matrix, residual, solve_linear
-from .state import BOOK, State, closed
+from ..definition.derivation import Derivation, Equation, Quantity, Solve
+from ..definition.notation import Matrix, residual, solve_linear
+from .state_vector import BOOK, StateVector, append_affine_row
 
 #: Relative size below which a pivot counts as vanished, and the failure code of a kernel then.
 PIVOT_LIMIT = sp.Rational(1, 10**8)
@@ -37,7 +37,7 @@ class HingeStatement:
 
     element: str
     title: str
-    state: State
+    state: StateVector
     free: sp.MatrixSymbol
     inputs: tuple[Quantity, ...]
     premises: tuple[Equation, ...]
@@ -68,9 +68,9 @@ def derivation(statement: HingeStatement) -> Derivation:
         ),
         definitions=(
             *statement.bias,
-            *_relation(statement, body),
-            *_elimination(n, freedoms, statement.equation),
-            *_margin(statement, scale),
+            *_relation_equations(statement, body),
+            *_elimination_equations(n, freedoms, statement.equation),
+            *_margin_equations(statement, scale),
         ),
         premises=(*statement.premises, *statement.conditions),
         sources=(f"{BOOK}, {statement.source}",),
@@ -82,36 +82,36 @@ def derivation(statement: HingeStatement) -> Derivation:
     )
 
 
-def carried(statement: HingeStatement) -> tuple[Matrix, Matrix]:
+def elimination_matrices(statement: HingeStatement) -> tuple[Matrix, Matrix]:
     """E and G of z_O = E z_I + G alpha (n x n and n x freedoms), solved from the premises."""
     state = statement.state
     freedoms = int(statement.free.rows)
     rows = solve_linear(statement.premises, state.at("O"), (*state.at("I"), statement.free))
-    before = state.length - 1
-    constant = rows[:, before + freedoms :]
-    carry = closed(Matrix(rows[:, :before].row_join(constant)))
-    free = Matrix(rows[:, before : before + freedoms].col_join(sp.zeros(1, freedoms)))
-    return carry, free
+    state_columns = state.length - 1
+    constant = rows[:, state_columns + freedoms :]
+    carried_state = append_affine_row(Matrix(rows[:, :state_columns].row_join(constant)))
+    free = Matrix(rows[:, state_columns : state_columns + freedoms].col_join(sp.zeros(1, freedoms)))
+    return carried_state, free
 
 
-def condition(statement: HingeStatement) -> tuple[Matrix, Matrix]:
+def condition_rows(statement: HingeStatement) -> tuple[Matrix, Matrix]:
     """L and t of the next hinge's condition L (m, q)_N = t (freedoms x efforts, freedoms x 1)."""
     efforts = statement.state.at("N")[2:]
     residuals = sp.Matrix.vstack(*(residual(equation) for equation in statement.conditions))
     columns = sp.Matrix([symbol[i, 0] for symbol in efforts for i in range(int(symbol.rows))])
     rows = residuals.jacobian(columns)
-    rest = (residuals - rows * columns).applyfunc(sp.expand)
+    remainder = (residuals - rows * columns).applyfunc(sp.expand)
     if rows.rows != int(statement.free.rows):
         raise ValueError(
             f"{statement.element}: {rows.rows} conditions for {statement.free.rows} free directions"
         )
-    return Matrix(rows), Matrix(-rest)
+    return Matrix(rows), Matrix(-remainder)
 
 
-def _relation(statement: HingeStatement, body: sp.MatrixSymbol) -> tuple[Equation, ...]:
+def _relation_equations(statement: HingeStatement, body: sp.MatrixSymbol) -> tuple[Equation, ...]:
     state = statement.state
-    carry, free = carried(statement)
-    rows, effort = condition(statement)
+    carry, free = elimination_matrices(statement)
+    rows, effort = condition_rows(statement)
     first, n, freedoms = state.accelerations, state.length, rows.rows
     outboard = Matrix(first, n, lambda i, j: body[first + i, j])
     right = Matrix(sp.zeros(freedoms, n - 1).row_join(effort))
@@ -130,49 +130,51 @@ def _relation(statement: HingeStatement, body: sp.MatrixSymbol) -> tuple[Equatio
     )  # fmt: skip
 
 
-def _elimination(n: int, freedoms: int, equation: str) -> tuple[Equation, ...]:
+def _elimination_equations(n: int, freedoms: int, equation: str) -> tuple[Equation, ...]:
     carry, free = sp.MatrixSymbol("E", n, n), sp.MatrixSymbol("G", n, freedoms)
     rows = sp.MatrixSymbol("L", freedoms, (n - 1) // 2)
     effort, outboard = sp.MatrixSymbol("T", freedoms, n), sp.MatrixSymbol("F", (n - 1) // 2, n)
     pivot, right = sp.MatrixSymbol("P", freedoms, freedoms), sp.MatrixSymbol("R", freedoms, n)
-    solved = sp.MatrixSymbol("KV", freedoms, n + freedoms)
+    solution = sp.MatrixSymbol("KV", freedoms, n + freedoms)
     gain, inverse = sp.MatrixSymbol("K", freedoms, n), sp.MatrixSymbol("V", freedoms, freedoms)
-    both = sp.BlockMatrix([[right, sp.Identity(freedoms)]])
+    right_sides = sp.BlockMatrix([[right, sp.Identity(freedoms)]])
     return (
         Equation("pivot", pivot, rows * outboard * free),
         Equation("right side", right, effort - rows * outboard * carry),
-        Equation("free accelerations", solved, Solve(pivot, both), "", "P^-1 [R, I]"),
-        Equation("gain", gain, _columns(solved, 0, n), "", "alpha = K z_I"),
-        Equation("inverse pivot", inverse, _columns(solved, n, freedoms)),
+        Equation("free accelerations", solution, Solve(pivot, right_sides), "", "P^-1 [R, I]"),
+        Equation("gain", gain, _column_block(solution, 0, n), "", "alpha = K z_I"),
+        Equation("inverse pivot", inverse, _column_block(solution, n, freedoms)),
         Equation("transfer matrix", sp.MatrixSymbol("U_h", n, n), carry + free * gain, equation),
     )
 
 
-def _columns(matrix: sp.MatrixSymbol, first: int, count: int) -> Matrix:
+def _column_block(matrix: sp.MatrixSymbol, first: int, count: int) -> Matrix:
     return Matrix(int(matrix.rows), count, lambda i, j: matrix[i, first + j])
 
 
-def _margin(statement: HingeStatement, scale: sp.MatrixSymbol) -> tuple[Equation, ...]:
+def _margin_equations(statement: HingeStatement, scale: sp.MatrixSymbol) -> tuple[Equation, ...]:
     """Pivot scale |L| F_scale |G| and the margin 1 / ||P^-1| scale| (row sums)."""
     freedoms = int(statement.free.rows)
-    _, free = carried(statement)
-    rows, _ = condition(statement)
-    moving = free[: statement.state.accelerations, :]
-    sizes = sp.MatrixSymbol("P_scale", freedoms, freedoms)
+    _, free = elimination_matrices(statement)
+    rows, _ = condition_rows(statement)
+    acceleration_rows = free[: statement.state.accelerations, :]
+    pivot_scale = sp.MatrixSymbol("P_scale", freedoms, freedoms)
     spread = sp.MatrixSymbol("P_spread", freedoms, freedoms)
     inverse = sp.MatrixSymbol("V", freedoms, freedoms)
     sums = [sp.Add(*(spread[i, j] for j in range(freedoms))) for i in range(freedoms)]
-    terms = Matrix(rows.applyfunc(sp.Abs)) * scale * Matrix(moving.applyfunc(sp.Abs))
+    terms = Matrix(rows.applyfunc(sp.Abs)) * scale * Matrix(acceleration_rows.applyfunc(sp.Abs))
     magnitudes = Matrix(inverse.as_explicit().applyfunc(sp.Abs))
     margin = Matrix([[1 / sp.Max(*sums)]])
     return (
-        Equation("pivot scale", sizes, terms, "", "magnitude of the terms that make the pivot"),
-        Equation("spread", spread, magnitudes * sizes),
+        Equation(
+            "pivot scale", pivot_scale, terms, "", "magnitude of the terms that make the pivot"
+        ),
+        Equation("spread", spread, magnitudes * pivot_scale),
         Equation("pivot margin", sp.MatrixSymbol("margin", 1, 1), margin),
     )
 
 
-def guards(hinge: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
+def pivot_guards(hinge: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
     """Guards for `derive.lower.kernel.lower`: leave with VANISHING_PIVOT below PIVOT_LIMIT."""
     margin = next(q.symbol for q in hinge.outputs if q.name == "margin")
     return (

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity
+from ..definition.derivation import Derivation, Equation, Quantity
 from . import hinge_relation
 from .hinge_relation import HingeStatement
-from .state import PLANAR
+from .state_vector import PLANAR
 
 FREE = sp.MatrixSymbol("alpha", 1, 1)
 NEXT_EFFORT = sp.MatrixSymbol("tau_n", 1, 1)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
-from ..language.notation import explicit
+from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..definition.notation import explicit
 from . import hinge_relation
 from .hinge_relation import HingeStatement
-from .state import SPATIAL
+from .state_vector import SPATIAL
 
 FREE = sp.MatrixSymbol("alpha", 1, 1)
 AXIS, NEXT_AXIS = vector("a", 3), vector("a_n", 3)

@@ -2,8 +2,8 @@
 
 import sympy as sp
 
-from ..language.derivation import tilde
-from ..language.element import Body, Param, Symbols
+from ..definition.derivation import tilde
+from ..definition.element import Body, Param, Symbols
 
 PARAMETERS = (
     Param("mass", "kg", "mass", minimum=0.0),

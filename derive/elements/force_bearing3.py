@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..language.element import ForceElement, Param, Symbols
+from ..definition.element import ForceElement, Param, Symbols
 
 _THREE = range(3)
 #: Of symmetric matrices the upper triangle is given, of antisymmetric ones what is above it.

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..language.element import ForceElement, Param, Symbols
+from ..definition.element import ForceElement, Param, Symbols
 from . import force_bushing6
 
 _SIX = range(6)

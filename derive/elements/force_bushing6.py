@@ -2,8 +2,8 @@
 
 import sympy as sp
 
-from ..language.element import ForceElement, Param, Symbols
-from ..language.turning import rotation_vector
+from ..definition.element import ForceElement, Param, Symbols
+from ..definition.rotation_derivatives import rotation_vector
 
 _SIX = range(6)
 #: Of symmetric matrices the upper triangle is given, row by row.

@@ -2,8 +2,8 @@
 
 import sympy as sp
 
-from ..language.element import Hinge, Param, Symbols
-from ..language.quaternion import rate_of, rotation_of
+from ..definition.element import Hinge, Param, Symbols
+from ..definition.quaternion import rate_of, rotation_of
 
 
 class Ball(Hinge):

@@ -1,6 +1,6 @@
 """Fixed hinge (weld): no relative motion."""
 
-from ..language.element import Hinge
+from ..definition.element import Hinge
 
 
 class Fixed(Hinge):

@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..language.element import Hinge, Param, Symbols
+from ..definition.element import Hinge, Param, Symbols
 
 
 class Prismatic(Hinge):

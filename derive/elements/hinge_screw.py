@@ -2,7 +2,7 @@
 
 import sympy as sp
 
-from ..language.element import Hinge, Param, Symbols, rotation_about
+from ..definition.element import Hinge, Param, Symbols, rotation_about
 
 
 class Screw(Hinge):

@@ -30,10 +30,10 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, tilde
-from .algebra import column, part, stack, symbol
-from .complement import DIRECTIONS
-from .loops import APART, SLIP, TURN
+from ..definition.derivation import Derivation, Equation, Quantity, tilde
+from .block_matrices import column, part, stack, symbol
+from .constrained_directions import DIRECTIONS
+from .loop_closure import APART, SLIP, TURN
 
 #: Least square of a length that is divided by, m^2: a point on a point, a disc that lies flat.
 _POINT = sp.Rational(1, 10**24)

@@ -18,10 +18,10 @@ import sympy as sp
 
 from mstmm.errors import ElementError
 
-from ..language import returned as stated
-from ..language.derivation import Derivation, Equation, Quantity, axial, vector
-from ..language.element import Hinge, Param, Symbols, described
-from ..language.switches import slope
+from ..definition import method_results as stated
+from ..definition.derivation import Derivation, Equation, Quantity, axial, vector
+from ..definition.element import Hinge, Param, Symbols, describe_array
+from ..definition.nonsmooth_functions import slope
 
 #: Trigonometric entries with more operations than this are left as differentiation gave them.
 SIMPLIFY_LIMIT = 400
@@ -182,7 +182,7 @@ def hinge_quantities(hinge: Hinge) -> tuple[Quantity, ...]:
         ("u", "speeds", speeds_of(hinge)),
     )
     return tuple(
-        Quantity(sp.MatrixSymbol(name, len(declared), 1), "", described(what, declared))
+        Quantity(sp.MatrixSymbol(name, len(declared), 1), "", describe_array(what, declared))
         for name, what, declared in groups
     )
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ..language.derivation import tilde
-from ..language.notation import Matrix
+from ..definition.derivation import tilde
+from ..definition.notation import Matrix
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,15 @@ shows that they agree identically.
 
 Vectors are 3 x 1 columns of components in body axes unless a name says otherwise; SI units.
 Source for comparison: Jing and Stephansson, Fundamentals of Discrete Element Methods for Rock
-Engineering, Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/printed` compares.
+Engineering, Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/book_formulas` compares.
 """
 
 from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import tilde
-from ..language.notation import Matrix
+from ..definition.derivation import tilde
+from ..definition.notation import Matrix
 from .mass_distribution import POINT, MassDistribution, general
 
 #: Position, velocity and acceleration of the body-fixed origin o, in body axes (m, m/s, m/s^2).

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
-from ..language.notation import Matrix, Tilde, explicit
+from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..definition.notation import Matrix, Tilde, explicit
 from . import newton_euler as ne
 from .mass_distribution import of_tensor
 

@@ -20,12 +20,12 @@ from collections.abc import Mapping
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, vector
-from ..language.notation import Matrix
+from ..definition.derivation import Derivation, Equation, Quantity, vector
+from ..definition.notation import Matrix
 
 _Y, _Z, _X = sp.symbols("y z x", real=True)
 
-X = Quantity(vector("x", 1), "m", "place along the beam")
+POSITION = Quantity(vector("x", 1), "m", "place along the beam")
 INERTIA = Quantity(
     vector("inertia", 3), "", "mass per length (kg/m), int rho y^2 dA, int rho z^2 dA (kg m)"
 )
@@ -35,7 +35,7 @@ STIFFNESS = Quantity(
 SOURCES = ("Shabana, Dynamics of Multibody Systems, ch. 5",)
 
 
-def _shape(k: str) -> tuple[Quantity, ...]:
+def _shape_quantities(k: str) -> tuple[Quantity, ...]:
     """The values of shape k at x: per unit of its modal coordinate."""
     return (
         Quantity(vector(f"axis_{k}", 3), "", f"displacement s, v, w of the axis by shape {k}"),
@@ -44,99 +44,103 @@ def _shape(k: str) -> tuple[Quantity, ...]:
     )
 
 
-SHAPE_K, SHAPE_L = _shape("k"), _shape("l")
+SHAPE_K, SHAPE_L = _shape_quantities("k"), _shape_quantities("l")
 
 
-def entries(quantity: Quantity) -> Matrix:
+def column_entries(quantity: Quantity) -> Matrix:
     """The entries of a column, one symbol each."""
     return Matrix([quantity.symbol[i, 0] for i in range(quantity.rows)])
 
 
-def _over_section(entry: sp.Expr, weights: Mapping[tuple[int, int], sp.Expr]) -> sp.Expr:
+def _integrate_section(entry: sp.Expr, weights: Mapping[tuple[int, int], sp.Expr]) -> sp.Expr:
     """int entry dA by the moments of the section about its centre and principal axes."""
     terms = sp.Poly(entry, _Y, _Z).terms()
     return sp.Add(*(c * weights.get(powers, sp.Integer(0)) for powers, c in terms))
 
 
-def over_mass(matrix: Matrix) -> Matrix:
+def integrate_mass(matrix: Matrix) -> Matrix:
     """int rho matrix dA: principal axes through the mass centre, so that odd moments vanish."""
-    m, yy, zz = entries(INERTIA)
-    return matrix.applyfunc(lambda e: _over_section(e, {(0, 0): m, (2, 0): yy, (0, 2): zz}))
+    m, yy, zz = column_entries(INERTIA)
+    return matrix.applyfunc(lambda e: _integrate_section(e, {(0, 0): m, (2, 0): yy, (0, 2): zz}))
 
 
-def point() -> Matrix:
+def undeformed_position() -> Matrix:
     """The undeformed place r0 of a point, from the root."""
-    return Matrix([X.symbol[0, 0], _Y, _Z])
+    return Matrix([POSITION.symbol[0, 0], _Y, _Z])
 
 
-def displacement(axis: Matrix, turn: Matrix) -> Matrix:
+def section_displacement(axis: Matrix, turn: Matrix) -> Matrix:
     """u at (y, z) of the section: the axis moves and the section turns about it."""
     return Matrix(axis) + Matrix(turn).cross(Matrix([0, _Y, _Z]))
 
 
-def _field(shape: tuple[Quantity, ...]) -> Matrix:
-    return displacement(entries(shape[0]), entries(shape[1]))
+def _shape_displacement(shape: tuple[Quantity, ...]) -> Matrix:
+    return section_displacement(column_entries(shape[0]), column_entries(shape[1]))
 
 
-def _strain_of_axis() -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
+def _axial_strain() -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
     """(axial strain at (y, z), the derivatives s', w'', v'' in it), from the displacement."""
     s, v, w, psi = (sp.Function(name)(_X) for name in ("s", "v", "w", "psi"))
-    moved = displacement(Matrix([s, v, w]), Matrix([psi, -w.diff(_X), v.diff(_X)]))
-    return moved[0].diff(_X), (s.diff(_X), w.diff(_X, 2), v.diff(_X, 2))
+    displacement_field = section_displacement(
+        Matrix([s, v, w]), Matrix([psi, -w.diff(_X), v.diff(_X)])
+    )
+    return displacement_field[0].diff(_X), (s.diff(_X), w.diff(_X, 2), v.diff(_X, 2))
 
 
 def strain_energy(strains: Matrix) -> sp.Expr:
     """Strain energy per length (J/m) of s', psi', w'', v''."""
-    axial, derivatives = _strain_of_axis()
+    axial, derivatives = _axial_strain()
     stretch, twist, curved_z, curved_y = strains
     axial = axial.subs(dict(zip(derivatives, (stretch, curved_z, curved_y), strict=True)))
-    ea, git, eiy, eiz = entries(STIFFNESS)
+    ea, git, eiy, eiz = column_entries(STIFFNESS)
     # E y^2 over the section is EI about z.
-    normal = _over_section(sp.expand(axial**2), {(0, 0): ea, (2, 0): eiz, (0, 2): eiy})
+    normal = _integrate_section(sp.expand(axial**2), {(0, 0): ea, (2, 0): eiz, (0, 2): eiy})
     return (normal + git * twist**2) / 2
 
 
-def _stiffness() -> sp.Expr:
+def _stiffness_integrand() -> sp.Expr:
     """Strain energy of eta_k shape_k + eta_l shape_l, its second derivative by eta_k, eta_l."""
     eta_k, eta_l = sp.symbols("eta_k eta_l")
-    both = eta_k * entries(SHAPE_K[2]) + eta_l * entries(SHAPE_L[2])
-    return sp.expand(sp.diff(strain_energy(both), eta_k, eta_l))
+    strains = eta_k * column_entries(SHAPE_K[2]) + eta_l * column_entries(SHAPE_L[2])
+    return sp.expand(sp.diff(strain_energy(strains), eta_k, eta_l))
 
 
-def rigid() -> Derivation:
+def rigid_integrands() -> Derivation:
     """Integrands of the mass, of int r0 and of int r0 r0^T."""
-    r = point()
-    mass, first = sp.MatrixSymbol("mass", 1, 1), vector("first", 3)
-    second = sp.MatrixSymbol("second", 3, 3)
+    r = undeformed_position()
+    mass, first_moment = sp.MatrixSymbol("mass", 1, 1), vector("first", 3)
+    second_moment = sp.MatrixSymbol("second", 3, 3)
     return Derivation(
         "beam",
         "integrands per length of the rigid beam's mass, first and second moments",
-        (X, INERTIA),
+        (POSITION, INERTIA),
         (
             Quantity(mass, "kg/m", "mass"),
-            Quantity(first, "kg", "int rho r0 dA"),
-            Quantity(second, "kg m", "int rho r0 r0^T dA", symmetric=True),
+            Quantity(first_moment, "kg", "int rho r0 dA"),
+            Quantity(second_moment, "kg m", "int rho r0 r0^T dA", symmetric=True),
         ),
         (
-            Equation("mass", mass, over_mass(Matrix([[1]]))),
-            Equation("first moment", first, over_mass(r)),
-            Equation("second moment", second, over_mass(Matrix(r * r.T)), symmetric=True),
+            Equation("mass", mass, integrate_mass(Matrix([[1]]))),
+            Equation("first moment", first_moment, integrate_mass(r)),
+            Equation(
+                "second moment", second_moment, integrate_mass(Matrix(r * r.T)), symmetric=True
+            ),
         ),
         sources=SOURCES,
         notes=("principal axes of the section through its mass centre",),
     )
 
 
-def moments() -> Derivation:
+def moment_integrands() -> Derivation:
     """Integrands of C, E, F and of the stiffness, for shapes k and l."""
-    r, uk, ul = point(), _field(SHAPE_K), _field(SHAPE_L)
+    r, uk, ul = undeformed_position(), _shape_displacement(SHAPE_K), _shape_displacement(SHAPE_L)
     c = vector("C", 3)
     e, f = sp.MatrixSymbol("E", 3, 3), sp.MatrixSymbol("F", 3, 3)
     stiffness = sp.MatrixSymbol("K", 1, 1)
     return Derivation(
         "beam",
         "integrands per length of the moments of two shapes",
-        (X, INERTIA, STIFFNESS, *SHAPE_K, *SHAPE_L),
+        (POSITION, INERTIA, STIFFNESS, *SHAPE_K, *SHAPE_L),
         (
             Quantity(c, "", "int rho u_k dA"),
             Quantity(e, "", "int rho r0 u_k^T dA"),
@@ -144,10 +148,10 @@ def moments() -> Derivation:
             Quantity(stiffness, "", "strain energy's second derivative by eta_k, eta_l"),
         ),
         (
-            Equation("C", c, over_mass(uk)),
-            Equation("E", e, over_mass(Matrix(r * uk.T))),
-            Equation("F", f, over_mass(Matrix(uk * ul.T))),
-            Equation("K", stiffness, Matrix([[_stiffness()]])),
+            Equation("C", c, integrate_mass(uk)),
+            Equation("E", e, integrate_mass(Matrix(r * uk.T))),
+            Equation("F", f, integrate_mass(Matrix(uk * ul.T))),
+            Equation("K", stiffness, Matrix([[_stiffness_integrand()]])),
         ),
         sources=SOURCES,
         notes=(
@@ -162,7 +166,7 @@ def section_rotation() -> Derivation:
     values = Quantity(vector("values", 4), "", "s, v, w, psi")
     slopes = Quantity(vector("slopes", 2), "", "v', w'")
     phi, theta = vector("phi", 3), vector("theta", 3)
-    s, v, w, psi = entries(values)
+    s, v, w, psi = column_entries(values)
     return Derivation(
         "beam",
         "displacement and rotation vector of a section by one shape",
@@ -177,4 +181,4 @@ def section_rotation() -> Derivation:
 
 
 #: Name -> derivation of the kernels of the linear fields.
-KERNELS = {"rigid": rigid, "moments": moments, "section": section_rotation}
+KERNELS = {"rigid": rigid_integrands, "moments": moment_integrands, "section": section_rotation}

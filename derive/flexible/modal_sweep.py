@@ -12,19 +12,29 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..equations.sweep import DELTA, SHIFT, SOURCES, E, R, S
-from ..language.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
-from .modal import E_F, S_FF, S_RF
-from .symbols import DAMPING, ETA, ETAD, STIFFNESS, N, column, modal, part, stack
+from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from ..equations.riccati_sweep import DELTA, SHIFT, SOURCES, E, R, S
+from .modal_residual import E_F, S_FF, S_RF
+from .modal_symbols import (
+    DAMPING,
+    ETA,
+    ETAD,
+    STIFFNESS,
+    N,
+    modal_columns,
+    modal_vector,
+    row_entries,
+    stack_rows,
+)
 
-H = modal("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
-WORK = modal("U", 6, "S H")
-RATES = column("etadd", "modal accelerations")
-TAU = column("tau", "efforts on the modes")
-GAIN = Quantity(sp.MatrixSymbol("Gg", N, 7), "", "etadd = g - G a: columns of G, then -g")
+MODAL_SUBSPACE = modal_columns("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
+WORK = modal_columns("U", 6, "S H")
+MODAL_ACCELERATIONS = modal_vector("etadd", "modal accelerations")
+MODAL_EFFORTS = modal_vector("tau", "efforts on the modes")
+MODAL_GAIN = Quantity(sp.MatrixSymbol("Gg", N, 7), "", "etadd = g - G a: columns of G, then -g")
 
 
-def _grow(quantity: Quantity) -> Quantity:
+def _accumulating(quantity: Quantity) -> Quantity:
     """The same array, as an output that is added to."""
     return Quantity(quantity.symbol, quantity.unit, quantity.meaning, accumulate=True)
 
@@ -32,18 +42,22 @@ def _grow(quantity: Quantity) -> Quantity:
 def absorb() -> Derivation:
     """Modal rows of what hangs on a port (its frame rows are carried as by any weld)."""
     force, moment = WORK.symbol[:3, :], WORK.symbol[3:, :]
-    lever = tilde(part(SHIFT.symbol, 0))
-    turned = R.symbol * force
+    lever = tilde(row_entries(SHIFT.symbol, 0))
+    rotated_force = R.symbol * force
     return Derivation(
         "modal",
         "S and e of a port, seen by the modes",
-        (R, SHIFT, H, S, E),
-        (WORK, _grow(S_RF), _grow(S_FF), _grow(E_F)),
+        (R, SHIFT, MODAL_SUBSPACE, S, E),
+        (WORK, _accumulating(S_RF), _accumulating(S_FF), _accumulating(E_F)),
         (
-            Equation("U = S H", WORK.symbol, S.symbol * H.symbol),
-            Equation("X^T U", S_RF.symbol, stack(turned, R.symbol * moment + lever * turned)),
-            Equation("H^T U", S_FF.symbol, H.symbol.T * WORK.symbol),
-            Equation("H^T e", E_F.symbol, H.symbol.T * E.symbol),
+            Equation("U = S H", WORK.symbol, S.symbol * MODAL_SUBSPACE.symbol),
+            Equation(
+                "X^T U",
+                S_RF.symbol,
+                stack_rows(rotated_force, R.symbol * moment + lever * rotated_force),
+            ),
+            Equation("H^T U", S_FF.symbol, MODAL_SUBSPACE.symbol.T * WORK.symbol),
+            Equation("H^T e", E_F.symbol, MODAL_SUBSPACE.symbol.T * E.symbol),
         ),
         sources=SOURCES,
     )
@@ -51,20 +65,20 @@ def absorb() -> Derivation:
 
 def rebase() -> Derivation:
     """Modal rows and columns once the frame's acceleration is a_I + H etadd."""
-    based = modal("S_rf_I", 6, "S_rf + S H")
-    before = S_RF.symbol
+    rebased = modal_columns("S_rf_I", 6, "S_rf + S H")
+    coupling = S_RF.symbol
     return Derivation(
         "modal",
         "frame followed from the section that is held",
-        (H, S, E, S_RF),
-        (based, _grow(S_FF), _grow(E_F)),
+        (MODAL_SUBSPACE, S, E, S_RF),
+        (rebased, _accumulating(S_FF), _accumulating(E_F)),
         (
-            Equation("S_rf + S H", based.symbol, before + S.symbol * H.symbol),
+            Equation("S_rf + S H", rebased.symbol, coupling + S.symbol * MODAL_SUBSPACE.symbol),
             Equation(
                 "H^T S_rf_I + S_rf^T H", S_FF.symbol,
-                H.symbol.T * based.symbol + before.T * H.symbol,
+                MODAL_SUBSPACE.symbol.T * rebased.symbol + coupling.T * MODAL_SUBSPACE.symbol,
             ),
-            Equation("H^T e", E_F.symbol, H.symbol.T * E.symbol),
+            Equation("H^T e", E_F.symbol, MODAL_SUBSPACE.symbol.T * E.symbol),
         ),
         sources=SOURCES,
     )  # fmt: skip
@@ -73,39 +87,43 @@ def rebase() -> Derivation:
 def condense() -> Derivation:
     """Modes eliminated: S - S_rf S_ff^-1 S_fr and e - S_rf S_ff^-1 e_f (efforts are in e_f)."""
     right = Quantity(sp.MatrixSymbol("right", N, 7), "", "S_fr, e_f")
-    reduced = Quantity(sp.MatrixSymbol("S_c", 6, 6), "", "S without modes", symmetric=True)
+    condensed = Quantity(sp.MatrixSymbol("S_c", 6, 6), "", "S without modes", symmetric=True)
     load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
-    both = sp.BlockMatrix([[S_RF.symbol.T, E_F.symbol]])
-    gain = GAIN.symbol
+    right_sides = sp.BlockMatrix([[S_RF.symbol.T, E_F.symbol]])
+    gain = MODAL_GAIN.symbol
     return Derivation(
         "modal",
         "modes of a flexible body condensed",
         (S, E, S_RF, S_FF, E_F),
-        (right, GAIN, reduced, load),
+        (right, MODAL_GAIN, condensed, load),
         (
-            Equation("[S_fr, e_f]", right.symbol, both),
+            Equation("[S_fr, e_f]", right.symbol, right_sides),
             Equation("S_ff^-1 [S_fr, e_f]", gain, Solve(S_FF.symbol, right.symbol, True)),
-            Equation("S_c", reduced.symbol, S.symbol - S_RF.symbol * gain[:, :6], symmetric=True),
+            Equation("S_c", condensed.symbol, S.symbol - S_RF.symbol * gain[:, :6], symmetric=True),
             Equation("e_c", load.symbol, E.symbol - S_RF.symbol * gain[:, 6:]),
         ),
         sources=SOURCES,
     )
 
 
-FRAME_DELTA = Quantity(vector("delta_I", 6), "", "deviation of the frame without the modes' part")
+FRAME_DEVIATION = Quantity(
+    vector("delta_I", 6), "", "deviation of the frame without the modes' part"
+)
 
 
 def recover() -> Derivation:
     """Modal accelerations from the deviation of the frame."""
-    gain = GAIN.symbol
+    gain = MODAL_GAIN.symbol
     return Derivation(
         "modal",
         "modal accelerations recovered",
-        (GAIN, FRAME_DELTA),
-        (RATES,),
+        (MODAL_GAIN, FRAME_DEVIATION),
+        (MODAL_ACCELERATIONS,),
         (
             Equation(
-                "etadd = g - G a", RATES.symbol, -gain[:, 6:] - gain[:, :6] * FRAME_DELTA.symbol
+                "etadd = g - G a",
+                MODAL_ACCELERATIONS.symbol,
+                -gain[:, 6:] - gain[:, :6] * FRAME_DEVIATION.symbol,
             ),
         ),
         sources=SOURCES,
@@ -117,22 +135,28 @@ def displaced() -> Derivation:
     return Derivation(
         "modal",
         "deviation with the modes' part",
-        (H, RATES, FRAME_DELTA),
+        (MODAL_SUBSPACE, MODAL_ACCELERATIONS, FRAME_DEVIATION),
         (DELTA,),
-        (Equation("a + H etadd", DELTA.symbol, FRAME_DELTA.symbol + H.symbol * RATES.symbol),),
+        (
+            Equation(
+                "a + H etadd",
+                DELTA.symbol,
+                FRAME_DEVIATION.symbol + MODAL_SUBSPACE.symbol * MODAL_ACCELERATIONS.symbol,
+            ),
+        ),
         sources=SOURCES,
     )
 
 
 def prescribed() -> Derivation:
     """Loads of prescribed modal accelerations s."""
-    s = column("s", "prescribed modal accelerations")
-    grown = Quantity(E.symbol, E.unit, E.meaning, accumulate=True)
+    s = modal_vector("s", "prescribed modal accelerations")
+    accumulated_load = Quantity(E.symbol, E.unit, E.meaning, accumulate=True)
     return Derivation(
         "modal",
         "loads of prescribed modal accelerations",
         (S_RF, S_FF, s),
-        (grown, _grow(E_F)),
+        (accumulated_load, _accumulating(E_F)),
         (
             Equation("S_rf s", E.symbol, S_RF.symbol * s.symbol),
             Equation("S_ff s", E_F.symbol, S_FF.symbol * s.symbol),
@@ -146,9 +170,13 @@ def modal_effort() -> Derivation:
     return Derivation(
         "modal",
         "efforts on the modes",
-        (H, E, E_F),
-        (TAU,),
-        (Equation("e_f + H^T e", TAU.symbol, E_F.symbol + H.symbol.T * E.symbol),),
+        (MODAL_SUBSPACE, E, E_F),
+        (MODAL_EFFORTS,),
+        (
+            Equation(
+                "e_f + H^T e", MODAL_EFFORTS.symbol, E_F.symbol + MODAL_SUBSPACE.symbol.T * E.symbol
+            ),
+        ),
         sources=SOURCES,
     )
 
@@ -156,11 +184,11 @@ def modal_effort() -> Derivation:
 def pushed() -> Derivation:
     """Load of a flexible body without its modes, once S is condensed: e - G^T e_f."""
     load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
-    gain = GAIN.symbol[:, :6]
+    gain = MODAL_GAIN.symbol[:, :6]
     return Derivation(
         "modal",
         "load of a flexible body condensed",
-        (GAIN, E, E_F),
+        (MODAL_GAIN, E, E_F),
         (load,),
         (Equation("e - G^T e_f", load.symbol, E.symbol - gain.T * E_F.symbol),),
         sources=SOURCES,
@@ -169,16 +197,20 @@ def pushed() -> Derivation:
 
 def answer() -> Derivation:
     """Modal accelerations that answer a load on the modes and the deviation of the frame."""
-    loaded = column("y", "S_ff^-1 e_f")
-    gain = GAIN.symbol[:, :6]
+    response = modal_vector("y", "S_ff^-1 e_f")
+    gain = MODAL_GAIN.symbol[:, :6]
     return Derivation(
         "modal",
         "modal accelerations that answer a load",
-        (S_FF, E_F, GAIN, FRAME_DELTA),
-        (loaded, RATES),
+        (S_FF, E_F, MODAL_GAIN, FRAME_DEVIATION),
+        (response, MODAL_ACCELERATIONS),
         (
-            Equation("S_ff^-1 e_f", loaded.symbol, Solve(S_FF.symbol, E_F.symbol, True)),
-            Equation("etadd", RATES.symbol, -loaded.symbol - gain * FRAME_DELTA.symbol),
+            Equation("S_ff^-1 e_f", response.symbol, Solve(S_FF.symbol, E_F.symbol, True)),
+            Equation(
+                "etadd",
+                MODAL_ACCELERATIONS.symbol,
+                -response.symbol - gain * FRAME_DEVIATION.symbol,
+            ),
         ),
         sources=SOURCES,
     )
@@ -192,7 +224,7 @@ def stiffened() -> Derivation:
         "modal",
         "modal rows within a step",
         (STIFFNESS, DAMPING, rate, inverse),
-        (_grow(S_FF),),
+        (_accumulating(S_FF),),
         (
             Equation(
                 "rate D + K / sq",
@@ -210,7 +242,7 @@ def strained() -> Derivation:
         "modal",
         "load of a change of the modes",
         (STIFFNESS, DAMPING, ETA, ETAD),
-        (_grow(E_F),),
+        (_accumulating(E_F),),
         (
             Equation(
                 "K eta + D etad",
@@ -223,6 +255,15 @@ def strained() -> Derivation:
 
 
 STEPS = (
-    absorb, rebase, condense, recover, displaced, prescribed, modal_effort, pushed, answer,
-    stiffened, strained,
-)  # fmt: skip
+    absorb,
+    rebase,
+    condense,
+    recover,
+    displaced,
+    prescribed,
+    modal_effort,
+    pushed,
+    answer,
+    stiffened,
+    strained,
+)

@@ -15,74 +15,94 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ..language.derivation import Derivation, Equation, Quantity, tilde, vector
-from .symbols import ETA, ETAD, SOURCES, column, modal, pair, part, stack
+from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from .modal_symbols import (
+    ETA,
+    ETAD,
+    SOURCES,
+    modal_columns,
+    modal_pair,
+    modal_vector,
+    row_entries,
+    stack_rows,
+)
 
 eta, etad = ETA.symbol, ETAD.symbol
 
 #: Largest rotation of a section against its frame, rad.
-LARGEST_TURN = sp.Rational(3, 2)
+MAX_SECTION_ROTATION = sp.Rational(3, 2)
 #: Terms of the series.
-TERMS = 11
+SERIES_TERM_COUNT = 11
 
 POINT = Quantity(vector("r", 3), "m", "section point at rest from o, frame axes")
-PHI = modal("phi", 3, "displacement of the point per mode")
-THETA = modal("theta", 3, "rotation vector of the section per mode")
-DRAWN = tuple(
-    pair(f"g_{a}", f"displacement of second order along {a}: -1/2 eta^T g eta") for a in "xyz"
+PHI = modal_columns("phi", 3, "displacement of the point per mode")
+THETA = modal_columns("theta", 3, "rotation vector of the section per mode")
+SECOND_DISPLACEMENTS = tuple(
+    modal_pair(f"g_{a}", f"displacement of second order along {a}: -1/2 eta^T g eta") for a in "xyz"
 )
-TURNED = tuple(
-    pair(f"h_{a}", f"rotation vector of second order about {a}: -1/2 eta^T h eta") for a in "xyz"
+SECOND_ROTATIONS = tuple(
+    modal_pair(f"h_{a}", f"rotation vector of second order about {a}: -1/2 eta^T h eta")
+    for a in "xyz"
 )
-JACOBIAN = modal("Phi", 6, "rates of point and rotation vector per modal speed")
+JACOBIAN = modal_columns("Phi", 6, "rates of point and rotation vector per modal speed")
 
-END = Quantity(sp.MatrixSymbol("R_end", 3, 3), "", "rotation, end axes to section axes")
-PLACE = Quantity(vector("x", 3), "m", "section point from o, frame axes")
-TURN = Quantity(vector("Psi", 3), "rad", "rotation vector of the section, frame axes")
-RATE = Quantity(vector("xd", 3), "m/s", "rate of x")
-TURN_RATE = Quantity(vector("Psid", 3), "rad/s", "rate of Psi")
-BIAS = Quantity(vector("xdd", 3), "m/s2", "second rate of x at etadd = 0")
-TURN_BIAS = Quantity(vector("Psidd", 3), "rad/s2", "second rate of Psi at etadd = 0")
+END_ROTATION = Quantity(sp.MatrixSymbol("R_end", 3, 3), "", "rotation, end axes to section axes")
+POSITION = Quantity(vector("x", 3), "m", "section point from o, frame axes")
+ROTATION_VECTOR = Quantity(vector("Psi", 3), "rad", "rotation vector of the section, frame axes")
+POSITION_RATE = Quantity(vector("xd", 3), "m/s", "rate of x")
+ROTATION_VECTOR_RATE = Quantity(vector("Psid", 3), "rad/s", "rate of Psi")
+POSITION_BIAS = Quantity(vector("xdd", 3), "m/s2", "second rate of x at etadd = 0")
+ROTATION_VECTOR_BIAS = Quantity(vector("Psidd", 3), "rad/s2", "second rate of Psi at etadd = 0")
 
 
 def section() -> Derivation:
     """Place and rotation vector of a section, their rates, and how they follow the modes."""
     at_rest = [field.symbol[a, :] for field in (PHI, THETA) for a in range(3)]
-    second = [g.symbol for g in (*DRAWN, *TURNED)]
-    rows = [row - eta.T * g for row, g in zip(at_rest, second, strict=True)]
-    bent = [-(etad.T * g) * etad for g in second]
-    along, about = JACOBIAN.symbol[:3, :], JACOBIAN.symbol[3:, :]
+    second_order = [g.symbol for g in (*SECOND_DISPLACEMENTS, *SECOND_ROTATIONS)]
+    rows = [row - eta.T * g for row, g in zip(at_rest, second_order, strict=True)]
+    second_rates = [-(etad.T * g) * etad for g in second_order]
+    point_rows, rotation_rows = JACOBIAN.symbol[:3, :], JACOBIAN.symbol[3:, :]
     return Derivation(
         "modal",
         "section of a flexible body",
-        (POINT, PHI, THETA, *DRAWN, *TURNED, ETA, ETAD),
-        (JACOBIAN, PLACE, TURN, RATE, TURN_RATE, BIAS, TURN_BIAS),
+        (POINT, PHI, THETA, *SECOND_DISPLACEMENTS, *SECOND_ROTATIONS, ETA, ETAD),
         (
-            Equation("rates per mode", JACOBIAN.symbol, stack(*rows)),
+            JACOBIAN,
+            POSITION,
+            ROTATION_VECTOR,
+            POSITION_RATE,
+            ROTATION_VECTOR_RATE,
+            POSITION_BIAS,
+            ROTATION_VECTOR_BIAS,
+        ),
+        (
+            Equation("rates per mode", JACOBIAN.symbol, stack_rows(*rows)),
             Equation(
                 "x = r + phi eta - eta^T g eta / 2",
-                PLACE.symbol,
-                POINT.symbol + _integrated(PHI.symbol, along),
+                POSITION.symbol,
+                POINT.symbol + _displacement_of_rates(PHI.symbol, point_rows),
             ),
-            Equation("Psi", TURN.symbol, _integrated(THETA.symbol, about)),
-            Equation("xd", RATE.symbol, along * etad),
-            Equation("Psid", TURN_RATE.symbol, about * etad),
-            Equation("xdd", BIAS.symbol, stack(*bent[:3])),
-            Equation("Psidd", TURN_BIAS.symbol, stack(*bent[3:])),
+            Equation(
+                "Psi", ROTATION_VECTOR.symbol, _displacement_of_rates(THETA.symbol, rotation_rows)
+            ),
+            Equation("xd", POSITION_RATE.symbol, point_rows * etad),
+            Equation("Psid", ROTATION_VECTOR_RATE.symbol, rotation_rows * etad),
+            Equation("xdd", POSITION_BIAS.symbol, stack_rows(*second_rates[:3])),
+            Equation("Psidd", ROTATION_VECTOR_BIAS.symbol, stack_rows(*second_rates[3:])),
         ),
         sources=SOURCES,
     )
 
 
-def _integrated(at_rest: sp.Basic, now: sp.Basic) -> sp.Basic:
+def _displacement_of_rates(at_rest: sp.Basic, now: sp.Basic) -> sp.Basic:
     """phi eta - 1/2 eta^T g eta from the rates phi at rest and phi - eta^T g now."""
     half = sp.Rational(1, 2)
     return half * (at_rest * eta) + half * (now * eta)
 
 
-def series(first: int, s: sp.Expr, derivative: bool = False) -> sp.Expr:
+def even_series(first: int, s: sp.Expr, derivative: bool = False) -> sp.Expr:
     """sum_k (-s)^k / (2 k + first)!, or its derivative by s, in Horner's form."""
-    signs = [sp.Integer((-1) ** k) / sp.factorial(2 * k + first) for k in range(TERMS)]
+    signs = [sp.Integer((-1) ** k) / sp.factorial(2 * k + first) for k in range(SERIES_TERM_COUNT)]
     terms = [k * c for k, c in enumerate(signs)][1:] if derivative else signs
     value = sp.Integer(0)
     for coefficient in reversed(terms):
@@ -93,39 +113,42 @@ def series(first: int, s: sp.Expr, derivative: bool = False) -> sp.Expr:
 SQUARE, COEFFICIENTS = vector("s", 1), vector("abc", 5)
 
 
-def _coefficients() -> tuple[Equation, ...]:
-    psi, psid = part(TURN.symbol, 0), part(TURN_RATE.symbol, 0)
+def _coefficient_equations() -> tuple[Equation, ...]:
+    psi, psid = row_entries(ROTATION_VECTOR.symbol, 0), row_entries(ROTATION_VECTOR_RATE.symbol, 0)
     s = SQUARE[0, 0]
     rate = 2 * sum(p * d for p, d in zip(psi, psid, strict=True))
-    values = [series(k, s) for k in (1, 2, 3)]
-    values += [rate * series(k, s, derivative=True) for k in (2, 3)]
+    values = [even_series(k, s) for k in (1, 2, 3)]
+    values += [rate * even_series(k, s, derivative=True) for k in (2, 3)]
     return (
         Equation("s = Psi . Psi", SQUARE, sp.ImmutableDenseMatrix([sum(p * p for p in psi)])),
         Equation("a, b, c, rates of b and c", COEFFICIENTS, sp.ImmutableDenseMatrix(values)),
     )
 
 
-def _rotation() -> sp.ImmutableDenseMatrix:
+def _rotation_matrix() -> sp.ImmutableDenseMatrix:
     a, b = COEFFICIENTS[0, 0], COEFFICIENTS[1, 0]
-    turn = tilde(part(TURN.symbol, 0))
+    turn = tilde(row_entries(ROTATION_VECTOR.symbol, 0))
     return sp.ImmutableDenseMatrix(sp.eye(3) + a * turn + b * (turn * turn))
 
 
-def _tangent(sign: int) -> sp.ImmutableDenseMatrix:
+def _tangent_operator(sign: int) -> sp.ImmutableDenseMatrix:
     """T(sign Psi)."""
     b, c = COEFFICIENTS[1, 0], COEFFICIENTS[2, 0]
-    turn = tilde(part(TURN.symbol, 0))
+    turn = tilde(row_entries(ROTATION_VECTOR.symbol, 0))
     return sp.ImmutableDenseMatrix(sp.eye(3) - sign * b * turn + c * (turn * turn))
 
 
 def _spin_rate(sign: int) -> sp.ImmutableDenseMatrix:
     """d/dt (T(sign Psi) Psid) at etadd = 0."""
     c, bd, cd = (COEFFICIENTS[k, 0] for k in (2, 3, 4))
-    turn, rate = tilde(part(TURN.symbol, 0)), tilde(part(TURN_RATE.symbol, 0))
-    crossed = turn * part(TURN_RATE.symbol, 0)
-    followed = _tangent(sign) * part(TURN_BIAS.symbol, 0)
+    turn, rate = (
+        tilde(row_entries(ROTATION_VECTOR.symbol, 0)),
+        tilde(row_entries(ROTATION_VECTOR_RATE.symbol, 0)),
+    )
+    cross_term = turn * row_entries(ROTATION_VECTOR_RATE.symbol, 0)
+    tangent_term = _tangent_operator(sign) * row_entries(ROTATION_VECTOR_BIAS.symbol, 0)
     return sp.ImmutableDenseMatrix(
-        followed - sign * bd * crossed + cd * (turn * crossed) + c * (rate * crossed)
+        tangent_term - sign * bd * cross_term + cd * (turn * cross_term) + c * (rate * cross_term)
     )
 
 
@@ -141,44 +164,54 @@ _OUTPUTS = (
 )
 
 
-def _motion(title: str, definitions: tuple[Equation, ...]) -> Derivation:
+def _motion_derivation(title: str, definitions: tuple[Equation, ...]) -> Derivation:
     return Derivation(
         "modal",
         title,
-        (END, PLACE, TURN, RATE, TURN_RATE, BIAS, TURN_BIAS),
+        (
+            END_ROTATION,
+            POSITION,
+            ROTATION_VECTOR,
+            POSITION_RATE,
+            ROTATION_VECTOR_RATE,
+            POSITION_BIAS,
+            ROTATION_VECTOR_BIAS,
+        ),
         _OUTPUTS,
-        (*_coefficients(), *definitions),
+        (*_coefficient_equations(), *definitions),
         sources=SOURCES,
     )
 
 
-def _rates(subspace: sp.Basic) -> tuple[Equation, ...]:
+def _velocity_equations(subspace: sp.Basic) -> tuple[Equation, ...]:
     h6 = _OUTPUTS[2].symbol
-    rates = stack(RATE.symbol, TURN_RATE.symbol)
-    whole = vector("vw", 6)
+    rates = stack_rows(POSITION_RATE.symbol, ROTATION_VECTOR_RATE.symbol)
+    velocities = vector("vw", 6)
     return (
         Equation("H6", h6, subspace),
-        Equation("relative velocities", whole, h6 * rates),
-        Equation("v", _OUTPUTS[3].symbol, part(whole, 0)),
-        Equation("w", _OUTPUTS[4].symbol, part(whole, 3)),
+        Equation("relative velocities", velocities, h6 * rates),
+        Equation("v", _OUTPUTS[3].symbol, row_entries(velocities, 0)),
+        Equation("w", _OUTPUTS[4].symbol, row_entries(velocities, 3)),
     )
 
 
 def outward() -> Derivation:
     """From the floating frame (inboard) to an end (outboard): as the kernel of a hinge."""
-    rotation, end = _OUTPUTS[0].symbol, END.symbol
-    none = sp.zeros(3, 3)
-    subspace = sp.BlockMatrix([[rotation.T, none], [none, end.T * _tangent(1)]])
-    return _motion(
+    rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
+    zero_block = sp.zeros(3, 3)
+    subspace = sp.BlockMatrix(
+        [[rotation.T, zero_block], [zero_block, end_rotation.T * _tangent_operator(1)]]
+    )
+    return _motion_derivation(
         "end of a flexible body against its floating frame",
         (
-            Equation("rotation", rotation, _rotation() * end),
-            Equation("place", _OUTPUTS[1].symbol, part(PLACE.symbol, 0)),
-            *_rates(subspace),
+            Equation("rotation", rotation, _rotation_matrix() * end_rotation),
+            Equation("place", _OUTPUTS[1].symbol, row_entries(POSITION.symbol, 0)),
+            *_velocity_equations(subspace),
             Equation(
                 "bias",
                 _OUTPUTS[5].symbol,
-                stack(rotation.T * BIAS.symbol, end.T * _spin_rate(1)),
+                stack_rows(rotation.T * POSITION_BIAS.symbol, end_rotation.T * _spin_rate(1)),
             ),
         ),
     )
@@ -189,43 +222,46 @@ def inward() -> Derivation:
 
     w = -W with W = T(-Psi) Psid the spin of the section in frame axes, v = W x x - xd.
     """
-    rotation, end = _OUTPUTS[0].symbol, END.symbol
-    lever = tilde(part(PLACE.symbol, 0))
+    rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
+    lever = tilde(row_entries(POSITION.symbol, 0))
     spin, rate = vector("W", 3), vector("Wd", 3)
-    none = sp.zeros(3, 3)
+    zero_block = sp.zeros(3, 3)
     subspace = sp.BlockMatrix(
-        [[-sp.ImmutableDenseMatrix(sp.eye(3)), -lever * _tangent(-1)], [none, -_tangent(-1)]]
+        [
+            [-sp.ImmutableDenseMatrix(sp.eye(3)), -lever * _tangent_operator(-1)],
+            [zero_block, -_tangent_operator(-1)],
+        ]
     )
-    turn, x = tilde(part(spin, 0)), part(PLACE.symbol, 0)
-    crossed = turn * x
+    turn, x = tilde(row_entries(spin, 0)), row_entries(POSITION.symbol, 0)
+    relative_velocity = turn * x
     linear = (
-        tilde(part(rate, 0)) * x
-        + 2 * turn * part(RATE.symbol, 0)
-        - part(BIAS.symbol, 0)
-        - turn * crossed
+        tilde(row_entries(rate, 0)) * x
+        + 2 * turn * row_entries(POSITION_RATE.symbol, 0)
+        - row_entries(POSITION_BIAS.symbol, 0)
+        - turn * relative_velocity
     )
-    return _motion(
+    return _motion_derivation(
         "floating frame against the end of the body that is held",
         (
-            Equation("rotation", rotation, end.T * _rotation().T),
-            Equation("place", _OUTPUTS[1].symbol, -rotation * PLACE.symbol),
-            *_rates(subspace),
-            Equation("spin of the section", spin, -part(_OUTPUTS[4].symbol, 0)),
+            Equation("rotation", rotation, end_rotation.T * _rotation_matrix().T),
+            Equation("place", _OUTPUTS[1].symbol, -rotation * POSITION.symbol),
+            *_velocity_equations(subspace),
+            Equation("spin of the section", spin, -row_entries(_OUTPUTS[4].symbol, 0)),
             Equation("its rate", rate, _spin_rate(-1)),
-            Equation("bias", _OUTPUTS[5].symbol, stack(linear, -part(rate, 0))),
+            Equation("bias", _OUTPUTS[5].symbol, stack_rows(linear, -row_entries(rate, 0))),
         ),
     )
 
 
 def turn_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
     """The rotation of a section must stay within the range of the series and of the model."""
-    text = f"a section turns by more than {LARGEST_TURN} rad against its floating frame"
-    return ((SQUARE[0, 0] < LARGEST_TURN**2, 1, text),)
+    text = f"a section turns by more than {MAX_SECTION_ROTATION} rad against its floating frame"
+    return ((SQUARE[0, 0] < MAX_SECTION_ROTATION**2, 1, text),)
 
 
 def subspace() -> Derivation:
     """H = H6 Phi: relative velocity of a port per modal speed."""
-    h = modal("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
+    h = modal_columns("H", 6, "motion subspace of the modes, rows v then w, outboard axes")
     return Derivation(
         "modal",
         "subspace of a port",
@@ -238,8 +274,8 @@ def subspace() -> Derivation:
 
 def imposed() -> Derivation:
     """Bias of a port when the modal accelerations are prescribed: c + H s."""
-    h = modal("H", 6, "motion subspace of the modes")
-    s = column("s", "prescribed modal accelerations")
+    h = modal_columns("H", 6, "motion subspace of the modes")
+    s = modal_vector("s", "prescribed modal accelerations")
     total = Quantity(vector("c_s", 6), "", "relative acceleration")
     return Derivation(
         "modal",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .steps import Add, Each, EachSpeed, Pass, Step, call, only
+from .pass_steps import Add, EachSpeed, ForEach, Pass, Step, call, only
 
 #: What the accelerations of a hinge in the tree tell the rows that name it.
 TOLD = call("generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known")
@@ -24,7 +24,7 @@ _TOLD_BY_OWN = (
     call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
 )
 #: Rows that name a hinge's own speeds begin on both sides of it.
-OF_OWN = Each(
+OF_OWN = ForEach(
     of="own",
     steps=(
         EachSpeed(
@@ -37,25 +37,25 @@ OF_OWN = Each(
     ),
 )  # fmt: skip
 #: What else they are told where the bias motion chooses accelerations.
-OF_OWN_BIAS = Each(
+OF_OWN_BIAS = ForEach(
     of="own",
     when="staged !corrected",
     steps=(call("generic{nu}.answered", y="body.chosen", z="own.tau", l="own.known"),),
 )
 #: The same where multipliers are known.
-OWN_TOLD = Each(of="own", steps=_TOLD_BY_OWN)
+OWN_TOLD = ForEach(of="own", steps=_TOLD_BY_OWN)
 
 
-def efforts_of_own(x: str, when: str) -> Each:
+def efforts_of_own(x: str, when: str) -> ForEach:
     """Efforts of couplings on own speeds, by their multipliers."""
     pull = call("generic{nu}.pull", y="own.tau", x=x, y_0="body.tau")
-    return Each(of="own", when=when, steps=(pull,))
+    return ForEach(of="own", when=when, steps=(pull,))
 
 
-def efforts_of(x: str, when: str, *more: Step) -> Each:
+def efforts_of(x: str, when: str, *more: Step) -> ForEach:
     """Efforts of the couplings of a hinge in the tree, by their multipliers."""
     pull = call("generic{nu}.pull", when="coupled", y="pending.tau", x=x, y_0="body.tau")
-    return Each(of="pending", when=when, steps=(pull, *more))
+    return ForEach(of="pending", when=when, steps=(pull, *more))
 
 
 #: Multipliers are known here, from an evaluation of accelerations in the same workspace.

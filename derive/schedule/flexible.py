@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .steps import ROOT_TO_TIPS, Add, Copy, Pass, call
+from .pass_steps import ROOT_TO_TIPS, Add, Copy, Pass, call
 
 _FIELDS = (
     "p", "C", "P", "B", "Z_xx", "Z_xy", "Z_xz", "Z_yy", "Z_yz", "Z_zz", "Y_x", "Y_y", "Y_z",

@@ -7,7 +7,7 @@ no more in memory than the next pass reads, and S and e stay at hand from link t
 
 from __future__ import annotations
 
-from .steps import TIPS_TO_ROOT, Pass, call
+from .pass_steps import TIPS_TO_ROOT, Pass, call
 
 _LINK = {"link": "link.numbers", "turn": "link.turn"}
 _BODY = {"b": "link.b", "p": "link.p"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .steps import Add, Copy, EachSpeed, Evaluate, Gather, Pass, Step, call
+from .pass_steps import Add, Copy, EachSpeed, Evaluate, Gather, Pass, Step, call
 
 EFFORTS = Pass(
     "efforts", "body", "Efforts of the caller where the sweep reads them.",

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from .approximate_tangent import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
 from .couplings import COUPLINGS_ANSWERED, COUPLINGS_LOADED
 from .flexible import DRAG, MOMENTUM, SECTION_MOTION, STRAIN
-from .inverse import REQUIRED
-from .laws_alone import LAWS_ALONE, LAWS_SOLUTION, RATES_CHANGE
+from .forward_kinematics import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
+from .inverse_dynamics import REQUIRED
+from .iterative_refinement import RESTATED, RESTATED_OF_TREE
 from .links import LINK_CONDENSE, LINK_FORWARD, LINK_RECOVER, LINK_TURN
 from .loads import DRIVE_POWER, EFFORTS, EFFORTS_POWER, FORCES, LAWS, LOADS
-from .loops import (
+from .loop_closure import (
     ANSWERED,
     CARRIED,
     CLOSURES,
@@ -20,15 +22,13 @@ from .loops import (
     ROW_FOUND,
     UNLOADED,
 )
-from .mass import COMPOSITION, EXERTED, FELT_BY
-from .motion import DRIVES, FORWARD, HINGE_MOTION, POSES, PRESCRIBED
-from .planar import sweep_in_plane
-from .qr import QR_CONDENSE, QR_OWN
-from .refine import RESTATED, RESTATED_OF_TREE
-from .riccati import CONDENSE, RECOVER
-from .solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
-from .steps import Pass, Run, Sweep
-from .tangent import (
+from .mass_matrix import COMPOSITION, EXERTED, FELT_BY
+from .mass_matrix_solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
+from .pass_steps import Pass, Run, Sweep
+from .planar_passes import sweep_in_plane
+from .qr_sweep import QR_CONDENSE, QR_OWN
+from .riccati_sweep import CONDENSE, RECOVER
+from .tangent_sweep import (
     APPLIED_SLOPE,
     BROUGHT,
     DIRECTIONAL,

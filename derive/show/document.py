@@ -8,15 +8,15 @@ from dataclasses import dataclass, field
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR, Port
 
-from ..language.derivation import Derivation, Equation, Quantity
-from .captions import as_text
-from .entries import Declared, Named, Parts
-from .formulas import stated
-from .ir import listing
-from .layout import Name, Node
-from .measure import Columns
-from .names import own_name, shown_name
-from .text import box
+from ..definition.derivation import Derivation, Equation, Quantity
+from .captions import caption_text
+from .entry_names import DeclaredNames, NamedEntries, Parts
+from .formula_layout import Name, Node
+from .formula_width import TextWidth
+from .formulas import equation_lines
+from .ir_text import kernel_listing
+from .plain_text import text_box
+from .symbol_names import parse_author_name, parse_name
 
 STAGES = ("equations", "matrix", "ir", "c")
 
@@ -41,7 +41,7 @@ class ElementView:
     kernels: Callable[[], Iterable[KernelIR]]
     c_text: Callable[[], str]
     sources: tuple[str, ...] = ()
-    declared: Declared = field(default_factory=Declared)
+    declared: DeclaredNames = field(default_factory=DeclaredNames)
     is_element: bool = False
 
 
@@ -100,47 +100,51 @@ class Code:
 Item = Heading | Paragraph | Quantities | Formula | Code
 
 
-def document(view: ElementView, at: str, measure: Columns) -> list[Item]:
+def document(view: ElementView, at: str, measure: TextWidth) -> list[Item]:
     """Items of the page at a stage, of formulas that fit.  ElementError for an unknown stage."""
     builders: dict[str, Callable[[ElementView], list[Item]]] = {
-        "equations": lambda v: _derived(v, _equations, measure),
-        "matrix": lambda v: _derived(v, _matrices, measure),
-        "ir": _kernels,
-        "c": _c_source,
+        "equations": lambda v: _derivation_items(v, _equation_items, measure),
+        "matrix": lambda v: _derivation_items(v, _matrix_items, measure),
+        "ir": _kernel_items,
+        "c": _c_source_items,
     }
     if at not in builders:
         raise ElementError(f"no stage {at!r}; there are {', '.join(STAGES)}")
-    return [Heading(view.title, 1), *_sources(view, _all_sources(view)), *builders[at](view)]
-
-
-def _all_sources(view: ElementView) -> tuple[str, ...]:
-    found = [*view.sources, *(s for d in view.derivations for s in d.sources)]
-    return tuple(dict.fromkeys(found))
-
-
-def _sources(view: ElementView, sources: tuple[str, ...]) -> list[Item]:
-    """Sources of the element, and apart from them those of the sweep."""
     return [
-        Paragraph(one, "sweep" if view.is_element and one not in view.sources else "sources")
-        for one in sources
+        Heading(view.title, 1),
+        *_source_items(view, _collect_sources(view)),
+        *builders[at](view),
     ]
 
 
-def _derived(
-    view: ElementView, part: Callable[[Derivation, Written], list[Item]], measure: Columns
+def _collect_sources(view: ElementView) -> tuple[str, ...]:
+    sources = [*view.sources, *(s for d in view.derivations for s in d.sources)]
+    return tuple(dict.fromkeys(sources))
+
+
+def _source_items(view: ElementView, sources: tuple[str, ...]) -> list[Item]:
+    """Sources of the element, and apart from them those of the sweep."""
+    return [
+        Paragraph(source, "sweep" if view.is_element and source not in view.sources else "sources")
+        for source in sources
+    ]
+
+
+def _derivation_items(
+    view: ElementView, part: Callable[[Derivation, FormulaWriter], list[Item]], measure: TextWidth
 ) -> list[Item]:
     items: list[Item] = []
     for derivation in view.derivations:
         if len(view.derivations) > 1:
             items.append(Heading(derivation.title, 2))
-        items += part(derivation, Written(derivation, view.declared, measure))
+        items += part(derivation, FormulaWriter(derivation, view.declared, measure))
     return items
 
 
-def _equations(derivation: Derivation, written: Written) -> list[Item]:
+def _equation_items(derivation: Derivation, written: FormulaWriter) -> list[Item]:
     """Items of quantities, premises and resulting equations."""
-    items: list[Item] = [Heading("Given", 3), _quantities(derivation.inputs, written)]
-    items += [Heading("Wanted", 3), _quantities(derivation.outputs, written)]
+    items: list[Item] = [Heading("Given", 3), _quantity_table(derivation.inputs, written)]
+    items += [Heading("Wanted", 3), _quantity_table(derivation.outputs, written)]
     if derivation.premises:
         items.append(Heading("Premises", 3))
         items += [written.formula(e) for e in derivation.premises]
@@ -149,9 +153,9 @@ def _equations(derivation: Derivation, written: Written) -> list[Item]:
     return items + [Paragraph(note, "note") for note in derivation.notes]
 
 
-def _matrices(derivation: Derivation, written: Written) -> list[Item]:
+def _matrix_items(derivation: Derivation, written: FormulaWriter) -> list[Item]:
     """The definitions that follow from the premises, large matrices block by block."""
-    items: list[Item] = [Heading("Result", 3), _quantities(derivation.outputs, written)]
+    items: list[Item] = [Heading("Result", 3), _quantity_table(derivation.outputs, written)]
     states = {q.name: STATES.get(q.unit.split(",")[0], "") for q in derivation.outputs}
     items += [
         written.formula(e, states.get(str(getattr(e.left, "name", "")), ""))
@@ -160,7 +164,7 @@ def _matrices(derivation: Derivation, written: Written) -> list[Item]:
     return items + [Paragraph(note, "note") for note in derivation.notes]
 
 
-def _quantities(quantities: Iterable[Quantity], written: Written) -> Quantities:
+def _quantity_table(quantities: Iterable[Quantity], written: FormulaWriter) -> Quantities:
     rows: list[QuantityRow] = []
     names = written.names
     for q in quantities:
@@ -169,39 +173,39 @@ def _quantities(quantities: Iterable[Quantity], written: Written) -> Quantities:
         symmetric = " (symmetric, upper triangle)" if q.symmetric else ""
         meaning = names.meaning(q.meaning) + symmetric
         shape = q.shape if q.shape[1] != 1 else q.shape[:1]
-        rows.append(_row(q.name, shape, q.unit, meaning))
-        rows += [] if q.sized else _entries(q.name, written.named.parts(q.name, q.rows))
+        rows.append(_quantity_row(q.name, shape, q.unit, meaning))
+        rows += [] if q.sized else _entry_rows(q.name, written.named.parts(q.name, q.rows))
     return Quantities(tuple(rows))
 
 
-def _ports(ports: Iterable[Port], names: Declared) -> Quantities:
+def _port_table(ports: Iterable[Port], names: DeclaredNames) -> Quantities:
     rows: list[QuantityRow] = []
     for p in ports:
         if 0 in p.shape:
             continue
         meaning = names.meaning(p.meaning) + (" (added to)" if p.accumulate else "")
-        rows.append(_row(p.name, p.shape, p.unit, meaning))
-        rows += _entries(p.name, names.parts(p.name, p.length()))
+        rows.append(_quantity_row(p.name, p.shape, p.unit, meaning))
+        rows += _entry_rows(p.name, names.parts(p.name, p.length()))
     return Quantities(tuple(rows))
 
 
-def _row(name: str, shape: tuple[int | str, ...], unit: str, meaning: str) -> QuantityRow:
+def _quantity_row(name: str, shape: tuple[int | str, ...], unit: str, meaning: str) -> QuantityRow:
     extents = " × ".join(map(str, shape)) or "1"
-    return QuantityRow(Name(shown_name(name)), name, extents, unit, meaning)
+    return QuantityRow(Name(parse_name(name)), name, extents, unit, meaning)
 
 
-def _entries(array: str, parts: Parts) -> Iterator[QuantityRow]:
+def _entry_rows(array: str, parts: Parts) -> Iterator[QuantityRow]:
     """Rows of the entries of an array, by the author's names."""
-    first = 0
+    start = 0
     for part in parts:
-        symbol = Name(own_name(part.name) if part.length == 1 else shown_name(part.name))
-        place = f"{array}[{first}]" if part.length == 1 else f"{array}[{first}...]"
+        symbol = Name(parse_author_name(part.name) if part.length == 1 else parse_name(part.name))
+        entry_text = f"{array}[{start}]" if part.length == 1 else f"{array}[{start}...]"
         shape = " × ".join(map(str, part.shape if part.shape[1] != 1 else part.shape[:1]))
-        yield QuantityRow(symbol, place, shape, part.unit, part.meaning, True)
-        first += part.length
+        yield QuantityRow(symbol, entry_text, shape, part.unit, part.meaning, True)
+        start += part.length
 
 
-def _kernels(view: ElementView) -> list[Item]:
+def _kernel_items(view: ElementView) -> list[Item]:
     items: list[Item] = []
     for kernel in view.kernels():
         counts = ", ".join(f"{count} {name}" for name, count in kernel.operation_counts().items())
@@ -210,37 +214,39 @@ def _kernels(view: ElementView) -> list[Item]:
             Heading(f"kernel {kernel.name}", 2),
             Paragraph(kernel.purpose or kernel.name),
             Paragraph(f"{kernel.flops()} floating-point operations ({counts}){once}", "note"),
-            *_sources(view, tuple(s for s in kernel.sources if s not in _all_sources(view))),
+            *_source_items(
+                view, tuple(s for s in kernel.sources if s not in _collect_sources(view))
+            ),
             Heading("reads", 3),
-            _ports(kernel.inputs, view.declared),
+            _port_table(kernel.inputs, view.declared),
             Heading("writes", 3),
-            _ports(kernel.outputs, view.declared),
+            _port_table(kernel.outputs, view.declared),
             Heading("statements", 3),
-            Code("\n".join(listing(kernel, view.declared))),
+            Code("\n".join(kernel_listing(kernel, view.declared))),
         ]
     return items
 
 
-def _c_source(view: ElementView) -> list[Item]:
+def _c_source_items(view: ElementView) -> list[Item]:
     items: list[Item] = []
     for kernel in view.kernels():
         items += [
             Heading(f"kernel {kernel.name}", 2),
-            _ports((*kernel.inputs, *kernel.outputs), view.declared),
+            _port_table((*kernel.inputs, *kernel.outputs), view.declared),
         ]
     return [*items, Heading("C", 2), Code(view.c_text().rstrip("\n"))]
 
 
-def _all(kernel: KernelIR) -> tuple[Port, ...]:
+def _all_ports(kernel: KernelIR) -> tuple[Port, ...]:
     return (*kernel.inputs, *kernel.outputs)
 
 
-class Written:
+class FormulaWriter:
     """Equations of a derivation as formulas that fit, in the names of its author."""
 
-    def __init__(self, derivation: Derivation, names: Declared, measure: Columns) -> None:
+    def __init__(self, derivation: Derivation, names: DeclaredNames, measure: TextWidth) -> None:
         self.names, self.measure = names, measure
-        self.named = Named(derivation, names)
+        self.named = NamedEntries(derivation, names)
 
     def formula(self, e: Equation, labels: str = "") -> Formula:
         """Formula of an equation, with the meaning of its blocks."""
@@ -252,10 +258,10 @@ class Written:
         array = str(getattr(e.left, "name", ""))
         rows = self.names.labels(array, shape[0]) if shape[1] == 1 else ()
         right = e.right.xreplace(self.named.entries)
-        lines = tuple(stated(e.left, right, rows, self.measure))
-        return Formula("" if _says(e.name, lines) else e.name, lines, e.source, remark)
+        lines = tuple(equation_lines(e.left, right, rows, self.measure))
+        return Formula("" if _repeats_formula(e.name, lines) else e.name, lines, e.source, remark)
 
 
-def _says(caption: str, lines: tuple[Node, ...]) -> bool:
+def _repeats_formula(caption: str, lines: tuple[Node, ...]) -> bool:
     """Whether a caption only repeats its formula."""
-    return len(lines) == 1 and as_text(caption).split() == box(lines[0]).lines[0].split()
+    return len(lines) == 1 and caption_text(caption).split() == text_box(lines[0]).lines[0].split()

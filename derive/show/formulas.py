@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import sympy as sp
 
-from .layout import Name, Node, Row, Sign, Table, Word, entry_index, equation, layout
-from .measure import Columns
-from .names import shown_name
-from .recognise import recognise
-from .text import box
+from .formula_layout import Name, Node, Row, Sign, Table, Word, entry_index, equation, layout
+from .formula_width import TextWidth
+from .plain_text import text_box
+from .symbol_names import parse_name
+from .vector_recognition import recognise_matrix
 
 #: Blocks of the matrices of the method: state vectors, wrenches and accelerations.
 PARTITIONS: dict[int, tuple[int, ...]] = {
@@ -20,34 +20,34 @@ PARTITIONS: dict[int, tuple[int, ...]] = {
     10: (2, 1, 1, 2, 3, 1), 15: (3, 3, 3, 3, 2, 1),
 }  # fmt: skip
 #: Matrices with more operations than this are stated with named common sub-expressions.
-SHARED_ABOVE = 150
+MAX_UNSHARED_OPERATIONS = 150
 
 
-def stated(
+def equation_lines(
     left: sp.Basic,
     right: sp.Basic,
     rows: tuple[str, ...] = (),
-    measure: Columns = Columns(),  # noqa: B008 - it holds nothing
+    measure: TextWidth = TextWidth(),  # noqa: B008 - it holds nothing
 ) -> list[Node]:
     """Lines of left = right; matrices in blocks where their extents are those of state vectors.
 
     `rows` are names of the entries of a column, which is stated entry by entry then; `measure`
     says what fits.
     """
-    return _Stated(measure).equation(layout(left), right, rows)
+    return _EquationWriter(measure).equation(layout(left), right, rows)
 
 
-class _Stated:
+class _EquationWriter:
     """Formulas by what fits."""
 
-    def __init__(self, measure: Columns) -> None:
+    def __init__(self, measure: TextWidth) -> None:
         self.measure = measure
 
     def equation(self, shown: Node, right: sp.Basic, rows: tuple[str, ...]) -> list[Node]:
         if isinstance(right, sp.MatrixBase):
             roots, right = self.rooted(right)
-            whole = self.of_rows(shown, right, rows) if rows else self.matrix(shown, right)
-            return [*roots, *whole]
+            lines_ = self.of_rows(shown, right, rows) if rows else self.matrix(shown, right)
+            return [*roots, *lines_]
         if not getattr(right, "is_Matrix", False):
             return self.scalar(shown, right)
         line = equation(shown, layout(right))
@@ -84,23 +84,23 @@ class _Stated:
         return lines
 
     def matrix(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-        small = max(matrix.shape) <= 6 and matrix.rows * matrix.cols <= 12
-        partitioned = any(extent in PARTITIONS for extent in matrix.shape)
-        if not partitioned or recognise(matrix) is not None:
+        is_small = max(matrix.shape) <= 6 and matrix.rows * matrix.cols <= 12
+        is_partitioned = any(extent in PARTITIONS for extent in matrix.shape)
+        if not is_partitioned or recognise_matrix(matrix) is not None:
             return self.spelled(shown, matrix)
         if matrix.cols == 1:
-            parts = list(_parts(matrix))
-            if all(len(part) == 1 or recognise(part) is not None for part in parts):
+            parts = list(_state_blocks(matrix))
+            if all(len(part) == 1 or recognise_matrix(part) is not None for part in parts):
                 line = equation(shown, Table(tuple((layout(part),) for part in parts)))
                 if self.measure.line(line):
                     return [line]
-        return self.spelled(shown, matrix) if small else self.blocks(shown, matrix)
+        return self.spelled(shown, matrix) if is_small else self.blocks(shown, matrix)
 
     def spelled(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
         """A matrix in one formula, or entry by entry where that is too wide."""
         if matrix.shape == (1, 1):
             return self.scalar(shown, matrix[0, 0])
-        if recognise(matrix) is not None or sp.count_ops(matrix) <= SHARED_ABOVE:
+        if recognise_matrix(matrix) is not None or sp.count_ops(matrix) <= MAX_UNSHARED_OPERATIONS:
             line = equation(shown, layout(matrix))
             if self.measure.line(line):
                 return [line]
@@ -111,25 +111,25 @@ class _Stated:
         rows = PARTITIONS.get(matrix.rows, (matrix.rows,))
         columns = PARTITIONS.get(matrix.cols, (matrix.cols,))
         table: list[tuple[Node, ...]] = []
-        below: list[Node] = []
+        block_definitions: list[Node] = []
         for i, height in enumerate(rows):
             cells = []
             for j, width in enumerate(columns):
-                first, start = sum(rows[:i]), sum(columns[:j])
-                block = matrix[first : first + height, start : start + width]
-                cell = layout(block) if sp.count_ops(block) <= SHARED_ABOVE else None
+                row_start, column_start = sum(rows[:i]), sum(columns[:j])
+                block = matrix[row_start : row_start + height, column_start : column_start + width]
+                cell = layout(block) if sp.count_ops(block) <= MAX_UNSHARED_OPERATIONS else None
                 if cell is None or not self.measure.cell(cell, len(columns)):
                     position = f"{i + 1}{j + 1}" if len(columns) > 1 else str(i + 1)
-                    cell = _named(shown, f"⟨{position}⟩")
-                    below += self.spelled(cell, block)
+                    cell = _indexed_name(shown, f"⟨{position}⟩")
+                    block_definitions += self.spelled(cell, block)
                 cells.append(cell)
             table.append(tuple(cells))
-        return [equation(shown, Table(tuple(table))), *below]
+        return [equation(shown, Table(tuple(table))), *block_definitions]
 
     def of_blocks(self, shown: Node, matrix: sp.BlockMatrix) -> list[Node]:
         """A matrix stated by its blocks, those that do not fit by names."""
         rows, columns = matrix.blocks.shape
-        below: list[Node] = []
+        block_definitions: list[Node] = []
         table = []
         for i in range(rows):
             cells = [layout(matrix.blocks[i, j]) for j in range(columns)]
@@ -137,24 +137,26 @@ class _Stated:
                 if not self.measure.line(Row((shown, cell, Word("   ")))) or columns > 1:
                     if self.measure.cell(cell, columns):
                         continue
-                    cells[j] = _named(shown, f"⟨{i + 1}{j + 1}⟩" if columns > 1 else f"⟨{i + 1}⟩")
-                    below += self.equation(cells[j], matrix.blocks[i, j], ())
+                    cells[j] = _indexed_name(
+                        shown, f"⟨{i + 1}{j + 1}⟩" if columns > 1 else f"⟨{i + 1}⟩"
+                    )
+                    block_definitions += self.equation(cells[j], matrix.blocks[i, j], ())
             table.append(tuple(cells))
-        return [equation(shown, Table(tuple(table))), *below]
+        return [equation(shown, Table(tuple(table))), *block_definitions]
 
     def entries(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
         """One line for every entry that does not vanish."""
         lines: list[Node] = []
         reduced = sp.Matrix(matrix)
-        if sp.count_ops(matrix) > SHARED_ABOVE:
+        if sp.count_ops(matrix) > MAX_UNSHARED_OPERATIONS:
             symbols = sp.numbered_symbols("c_", start=1)
-            shared, (reduced,) = sp.cse([sp.Matrix(matrix)], symbols=symbols)
-            for symbol, value in shared:
+            common_terms, (reduced,) = sp.cse([sp.Matrix(matrix)], symbols=symbols)
+            for symbol, value in common_terms:
                 lines += self.scalar(layout(symbol), value)
         for i in range(matrix.rows):
             for j in range(matrix.cols):
                 if reduced[i, j] != 0:
-                    lines += self.scalar(_entry(shown, matrix.shape, i, j), reduced[i, j])
+                    lines += self.scalar(_entry_name(shown, matrix.shape, i, j), reduced[i, j])
         if any(entry == 0 for entry in reduced):
             lines.append(Word("all other entries are 0"))
         return lines
@@ -162,12 +164,14 @@ class _Stated:
     def scalar(self, place: Node, value: sp.Basic) -> list[Node]:
         """place = value; a choice that does not fit becomes one line for each branch."""
         line = equation(place, layout(value))
-        if self.measure.line(line) or (len(box(line).lines) == 1 and not value.has(sp.Piecewise)):
+        if self.measure.line(line) or (
+            len(text_box(line).lines) == 1 and not value.has(sp.Piecewise)
+        ):
             return [line]
         if isinstance(value, sp.Piecewise):
-            return [_branch(place, *pair) for pair in value.args]
-        pieces = list(_choices(value))
-        names = {piece: _named(place, f"⟨{k}⟩") for k, piece in enumerate(pieces, start=1)}
+            return [_branch_row(place, *pair) for pair in value.args]
+        pieces = list(_outermost_choices(value))
+        names = {piece: _indexed_name(place, f"⟨{k}⟩") for k, piece in enumerate(pieces, start=1)}
         lines: list[Node] = [equation(place, layout(value, names))]
         for piece, name in names.items():
             lines += self.scalar(name, piece)
@@ -177,10 +181,10 @@ class _Stated:
         """Explicit matrices inside a wide expression get names and are stated below it."""
         names: dict[sp.Basic, Node] = {}
         for matrix in _inner_matrices(right):
-            if matrix not in names and recognise(matrix) is None:
-                wide = sp.count_ops(matrix) > SHARED_ABOVE
-                if wide or not self.measure.inner(layout(matrix)):
-                    names[matrix] = _named(shown, f"⟨{len(names) + 1}⟩")
+            if matrix not in names and recognise_matrix(matrix) is None:
+                is_wide = sp.count_ops(matrix) > MAX_UNSHARED_OPERATIONS
+                if is_wide or not self.measure.inner(layout(matrix)):
+                    names[matrix] = _indexed_name(shown, f"⟨{len(names) + 1}⟩")
         if not names:
             return []
         lines: list[Node] = [equation(shown, layout(right, names))]
@@ -190,46 +194,46 @@ class _Stated:
         return [line for matrix, name in names.items() for line in self.matrix(name, matrix)]
 
 
-def _parts(column: sp.MatrixBase) -> Iterator[sp.MatrixBase]:
+def _state_blocks(column: sp.MatrixBase) -> Iterator[sp.MatrixBase]:
     """Parts of a column as state vectors have them."""
-    first = 0
+    start = 0
     for height in PARTITIONS[column.rows]:
-        yield column[first : first + height, :]
-        first += height
+        yield column[start : start + height, :]
+        start += height
 
 
-def _named(shown: Node, index: str) -> Name:
+def _indexed_name(shown: Node, index: str) -> Name:
     """A name made from the left side's by an index."""
     if not isinstance(shown, Name):
-        return Name(shown_name("B"), "", index)
+        return Name(parse_name("B"), "", index)
     outer = shown.index
     if outer.endswith("⟩"):
         outer, index = outer[:-1], f".{index[1:]}"
     return Name(shown.name, shown.accent, outer + index)
 
 
-def _entry(shown: Node, shape: tuple[int, int], i: int, j: int) -> Node:
+def _entry_name(shown: Node, shape: tuple[int, int], i: int, j: int) -> Node:
     if isinstance(shown, Name):
         index = entry_index(shown.name.written(), shape, i, j)
         return Name(shown.name, shown.accent, shown.index + index)
     return Row((shown, Word(f"[{entry_index('', shape, i, j)}]")))
 
 
-def _branch(place: Node, value: sp.Basic, condition: sp.Basic) -> Node:
-    word = "   " if condition in (True, sp.true) else "   if "
-    items = (place, Sign("=", True), layout(value), Word(word), layout(condition))
+def _branch_row(place: Node, value: sp.Basic, condition: sp.Basic) -> Node:
+    separator = "   " if condition in (True, sp.true) else "   if "
+    items = (place, Sign("=", True), layout(value), Word(separator), layout(condition))
     return Row(items)
 
 
-def _choices(value: sp.Basic) -> Iterator[sp.Piecewise]:
+def _outermost_choices(value: sp.Basic) -> Iterator[sp.Piecewise]:
     """Outermost choices of an expression, each once, in a fixed order."""
-    seen: set[sp.Basic] = set()
+    visited: set[sp.Basic] = set()
     stack = [value]
     while stack:
         current = stack.pop()
         if isinstance(current, sp.Piecewise):
-            if current not in seen:
-                seen.add(current)
+            if current not in visited:
+                visited.add(current)
                 yield current
         else:
             stack.extend(sorted(current.args, key=sp.default_sort_key, reverse=True))

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import re
 
-from .layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
-from .names import GREEK, ShownName
+from .formula_layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
+from .symbol_names import GREEK, SymbolName
 
-_SIGNS = {
+_SIGN_COMMANDS = {
     "−": "-", "≤": r"\le ", "≥": r"\ge ", "≠": r"\ne ", " ": r"\,", "·": r"\cdot ",
 }  # fmt: skip
-_WORDS = {
+_WORD_COMMANDS = {
     "∼": r"\sim", "⊥": r"\perp", "π": r"\pi", "T": r"\mathsf{T}", "−1": "-1", "I": "I",
     "−T": r"-\mathsf{T}", "∫": r"\textstyle\int",
 }  # fmt: skip
 _FUNCTIONS = {"sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "max", "min"}
-_TEXT = {
+_TEXT_ESCAPES = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "_": r"\_", "%": r"\%", "&": r"\&",
     "#": r"\#", "$": r"\$", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
     "<": r"\textless{}", ">": r"\textgreater{}", "–": "--", "·": r"$\cdot$", "…": r"\dots{}",
@@ -23,29 +23,29 @@ _TEXT = {
     "×": r"$\times$", "\u2003": r"\quad{}",
 }  # fmt: skip
 #: Matrices of more columns than this stand closer.
-_NARROW = 5
+_MAX_WIDE_COLUMNS = 5
 
 
-def escaped(text: str) -> str:
+def escape_latex(text: str) -> str:
     """Plain text safe in a LaTeX paragraph."""
-    return "".join(_TEXT.get(c, c) for c in text)
+    return "".join(_TEXT_ESCAPES.get(c, c) for c in text)
 
 
 def latex_unit(unit: str) -> str:
     """kg*m2 as kg m^2, upright."""
     if not unit:
         return "--"
-    text = escaped(unit).replace("*", r"\,")
+    text = escape_latex(unit).replace("*", r"\,")
     return re.sub(r"(?<=[A-Za-z])(?:\\textasciicircum\{\})?(-?\d+)", r"\\textsuperscript{\1}", text)
 
 
-def latex_name(name: ShownName, accent: str = "", index: str = "") -> str:
+def latex_name(name: SymbolName, accent: str = "", index: str = "") -> str:
     """A name with its dots, accent, subscript and index."""
-    core = _core(name)
+    core = _base_text(name)
     core = {0: core, 1: rf"\dot{{{core}}}", 2: rf"\ddot{{{core}}}"}[min(name.dots, 2)]
     if accent == "tilde":
         core = rf"\tilde{{{core}}}" if len(name.base) == 1 else rf"\widetilde{{{core}}}"
-    subscript = [_subscript(name.subscript)] if name.subscript else []
+    subscript = [_subscript_text(name.subscript)] if name.subscript else []
     for sign, command in (("…", r"\dots "), ("⟨", r"\langle "), ("⟩", r"\rangle ")):
         index = index.replace(sign, command)
     subscript += [index] if index else []
@@ -53,7 +53,7 @@ def latex_name(name: ShownName, accent: str = "", index: str = "") -> str:
     return f"{core}{tail}" + (r"^{\perp}" if accent == "perp" else "")
 
 
-def _core(name: ShownName) -> str:
+def _base_text(name: SymbolName) -> str:
     if name.base in GREEK:
         return "\\" + name.base
     if name.upright or len(name.base) > 1:
@@ -61,42 +61,42 @@ def _core(name: ShownName) -> str:
     return name.base
 
 
-def _subscript(text: str) -> str:
+def _subscript_text(text: str) -> str:
     return rf"\mathrm{{{text}}}".replace("_", r"\_") if len(text) > 1 else text
 
 
-def latex(node: Node) -> str:
+def latex_text(node: Node) -> str:
     """The node as the content of a formula."""
     if isinstance(node, Name):
         return latex_name(node.name, node.accent, node.index)
     if isinstance(node, Word):
-        return _word(node.text)
+        return _word_text(node.text)
     if isinstance(node, Sign):
-        sign = _SIGNS.get(node.text, node.text)
+        sign = _SIGN_COMMANDS.get(node.text, node.text)
         return f" {sign} " if node.spaced else sign
     if isinstance(node, Row):
-        return "".join(latex(item) for item in node.items)
+        return "".join(latex_text(item) for item in node.items)
     if isinstance(node, Fraction):
-        return rf"\frac{{{latex(node.above)}}}{{{latex(node.below)}}}"
+        return rf"\frac{{{latex_text(node.above)}}}{{{latex_text(node.below)}}}"
     if isinstance(node, Raised):
-        return rf"{{{latex(node.base)}}}^{{{latex(node.exponent)}}}"
+        return rf"{{{latex_text(node.base)}}}^{{{latex_text(node.exponent)}}}"
     if isinstance(node, Fence):
-        return rf"\left{node.left}{latex(node.body)}\right{node.right}"
+        return rf"\left{node.left}{latex_text(node.body)}\right{node.right}"
     if isinstance(node, Root):
-        return rf"\sqrt{{{latex(node.body)}}}"
-    rows = r" \\ ".join(" & ".join(latex(cell) for cell in row) for row in node.rows)
+        return rf"\sqrt{{{latex_text(node.body)}}}"
+    rows = r" \\ ".join(" & ".join(latex_text(cell) for cell in row) for row in node.rows)
     if node.cases:
         return rf"\begin{{cases}} {rows} \end{{cases}}"
     columns = len(node.rows[0])
-    narrow = r"\arraycolsep3pt" if columns > _NARROW else ""
+    narrow = r"\arraycolsep3pt" if columns > _MAX_WIDE_COLUMNS else ""
     return rf"\left[{narrow}\begin{{array}}{{{'c' * columns}}} {rows} \end{{array}}\right]"
 
 
-def _word(text: str) -> str:
-    if text in _WORDS:
-        return _WORDS[text]
+def _word_text(text: str) -> str:
+    if text in _WORD_COMMANDS:
+        return _WORD_COMMANDS[text]
     if text in _FUNCTIONS:
         return "\\" + text
     if re.fullmatch(r"−?[0-9.]+", text):
         return text.replace("−", "-")
-    return rf"\text{{{escaped(text)}}}"
+    return rf"\text{{{escape_latex(text)}}}"

@@ -13,92 +13,110 @@ from functools import cache, partial
 
 from mstmm.errors import ElementError
 from mstmm.ir import KernelIR
-from mstmm.ir.spec import ElementSpec
+from mstmm.ir.element_spec import ElementSpec
 
+from ..catalogue.element_specs import generic_spec, shared_specs, spec_of
 from ..catalogue.kernels import MAX_SPEEDS, Kernel, built_in, built_in_kernels, kernels_of
 from ..catalogue.registry import Element, builtin_elements, kind_of
-from ..catalogue.specs import generic_spec, shared_specs, spec_of
 from ..classical.catalogue import classical_spec
+from ..codegen.template_rendering import element_source
+from ..definition.derivation import Derivation
+from ..definition.element import Hinge
 from ..elements.body_rigid import RigidBody
 from ..equations.hinge import speeds_of
 from ..equations.rigid_body import newton_euler_form
-from ..language.derivation import Derivation
-from ..language.element import Hinge
-from ..print.render import element_source
 from .document import ElementView
-from .entries import Declared, declared
+from .entry_names import DeclaredNames, declared_names
 
-__all__ = ["KINDS", "ElementView", "full_name", "names", "of_element", "view"]
+__all__ = [
+    "ELEMENT_KINDS",
+    "ElementView",
+    "element_view",
+    "full_name",
+    "full_names",
+    "view_of_element",
+]
 
-KINDS = ("hinge", "body", "force", "classical", "sweep")
+ELEMENT_KINDS = ("hinge", "body", "force", "classical", "sweep")
 
 #: A second name of an element: the same motion, its law is in sweep_laws.
 _ALIASES = {"hinge_elastic": ("hinge", "free")}
 
 
-def names() -> list[str]:
+def full_names() -> list[str]:
     """Every full name, by kind."""
-    return list(_keys())
+    return list(_element_keys())
 
 
 @cache
-def _keys() -> dict[str, tuple[str, str]]:
-    keys = sorted(built_in(), key=lambda key: KINDS.index(key[0]))
+def _element_keys() -> dict[str, tuple[str, str]]:
+    keys = sorted(built_in(), key=lambda key: ELEMENT_KINDS.index(key[0]))
     return {f"{kind}_{name}": (kind, name) for kind, name in keys} | _ALIASES
 
 
 def full_name(name: str, known: Iterable[str]) -> str | None:
     """The full name that a user means, None if there is none."""
-    there = set(known)
-    return next((c for c in (name, *(f"{kind}_{name}" for kind in KINDS)) if c in there), None)
+    known_names = set(known)
+    return next(
+        (c for c in (name, *(f"{kind}_{name}" for kind in ELEMENT_KINDS)) if c in known_names), None
+    )
 
 
-def view(name: str) -> ElementView:
+def element_view(name: str) -> ElementView:
     """The view of a built-in element.  Raises ElementError, with the nearest name, for another."""
-    full = full_name(name, _keys())
-    if full is None:
-        short = [key.split("_", 1)[1] for key in _keys()]
-        near = difflib.get_close_matches(name, [*_keys(), *short], 1, 0.6)
-        hint = f'; did you mean "{near[0]}"?' if near else "; mstmm list shows what there is"
+    matched_name = full_name(name, _element_keys())
+    if matched_name is None:
+        short = [key.split("_", 1)[1] for key in _element_keys()]
+        similar_names = difflib.get_close_matches(name, [*_element_keys(), *short], 1, 0.6)
+        hint = (
+            f'; did you mean "{similar_names[0]}"?'
+            if similar_names
+            else "; mstmm list shows what there is"
+        )
         raise ElementError(f'element "{name:.60}": there is no such element{hint}')
-    kind, own = _keys()[full]
+    kind, element_name = _element_keys()[matched_name]
     for element in builtin_elements():
-        if (kind_of(element), element.name) == (kind, own):
-            return of_element(element)
-    return _of_step(kind, own)
+        if (kind_of(element), element.name) == (kind, element_name):
+            return view_of_element(element)
+    return _view_of_step(kind, element_name)
 
 
-def of_element(element: Element) -> ElementView:
+def view_of_element(element: Element) -> ElementView:
     """View of a hinge, body or force element, built in or a user's."""
     name = f"{kind_of(element)}_{element.name}"
-    before = tuple(make() for kind, make in _BEFORE.items() if type(element) is kind)
-    sources = (*element.sources, *(source for one in before for source in one.sources))
-    shown = _view(
+    preceding = tuple(
+        make() for kind, make in _PRECEDING_DERIVATIONS.items() if type(element) is kind
+    )
+    sources = (
+        *element.sources,
+        *(source for derivation in preceding for source in derivation.sources),
+    )
+    base_view = _make_view(
         name, element.title or element.name, kernels_of(element), sources,
-        lambda: element_source(spec_of(element)), _declared(element), before,
+        lambda: element_source(spec_of(element)), _names_of_element(element), preceding,
     )  # fmt: skip
-    return replace(shown, is_element=True)
+    return replace(base_view, is_element=True)
 
 
 #: Separate derivations that precede the equations of an element.
-_BEFORE: dict[type, Callable[[], Derivation]] = {RigidBody: newton_euler_form}
+_PRECEDING_DERIVATIONS: dict[type, Callable[[], Derivation]] = {RigidBody: newton_euler_form}
 
 
-def _declared(element: Element) -> Declared:
+def _names_of_element(element: Element) -> DeclaredNames:
     if isinstance(element, Hinge):
-        return declared(element.coordinates, speeds_of(element), element.parameters)
-    return declared((), (), element.parameters)
+        return declared_names(element.coordinates, speeds_of(element), element.parameters)
+    return declared_names((), (), element.parameters)
 
 
-def _of_step(kind: str, name: str) -> ElementView:
+def _view_of_step(kind: str, name: str) -> ElementView:
     """A classical matrix or a step of the sweep."""
     spec = cache(partial(_spec_of_step, kind, name))
     kernels = built_in_kernels(kind, name)
-    title = kernels[0].derivation.title if kind == "classical" else _TITLES.get(name, name)
-    return _view(f"{kind}_{name}", title, kernels, (), lambda: element_source(spec()))
+    title = kernels[0].derivation.title if kind == "classical" else _STEP_TITLES.get(name, name)
+    return _make_view(f"{kind}_{name}", title, kernels, (), lambda: element_source(spec()))
 
 
-_TITLES = {
+_STEP_TITLES = {
     "frames": "poses, points and loads",
     "laws": "laws on hinge coordinates",
     "beam": "Euler-Bernoulli beam",
@@ -114,17 +132,17 @@ def _spec_of_step(kind: str, name: str) -> ElementSpec:
     return next(spec for spec in shared_specs() if spec.name == name)
 
 
-def _view(
+def _make_view(
     name: str,
     title: str,
     kernels: tuple[Kernel, ...],
     sources: tuple[str, ...],
     c_text: Callable[[], str],
-    names: Declared | None = None,
+    names: DeclaredNames | None = None,
     before: tuple[Derivation, ...] = (),
 ) -> ElementView:
     def lowered() -> tuple[KernelIR, ...]:
         return tuple(kernel.ir() for kernel in kernels)
 
     derivations = (*before, *(k.derivation for k in kernels))
-    return ElementView(name, title, derivations, lowered, c_text, sources, names or Declared())
+    return ElementView(name, title, derivations, lowered, c_text, sources, names or DeclaredNames())

@@ -8,21 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..arguments import short
+from ..argument_validation import abbreviate
 from ..errors import EnvironmentFailure, SceneError
-from ..runtime.host.files import write_text
+from ..runtime.platform_support.safe_files import write_text
 from . import cases as known
-from .case import Case, measure
+from .case_plot import MeasuredCase, measure_case
 
 #: Values of the coarse grid, and relative width of the last bracket.
-POINTS, TOLERANCE = 13, 0.01
+GRID_POINTS, BRACKET_TOLERANCE = 13, 0.01
 
 
 @dataclass(frozen=True)
 class Atlas:
     """Measured cases of the atlas, in the requested order."""
 
-    cases: tuple[Case, ...]
+    cases: tuple[MeasuredCase, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """Convert to plain data, {"cases": [...]}."""
@@ -44,26 +44,26 @@ class Atlas:
         Returns the paths.  The folder is created with its parents; raises EnvironmentFailure if
         that fails.
         """
-        from .page import page
+        from .page import markdown_page
 
-        place = Path(folder)
+        folder_path = Path(folder)
         try:
-            place.mkdir(parents=True, exist_ok=True)
+            folder_path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise EnvironmentFailure(
-                f'folder "{place}" cannot be created: {error.strerror}'
+                f'folder "{folder_path}" cannot be created: {error.strerror}'
             ) from None
-        data, text = place / "atlas.json", place / "atlas.md"
-        write_text(data, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
-        write_text(text, page(self.cases, pictures))
-        return [data, text, *(self.plot(place) if pictures else ())]
+        json_path, page_path = folder_path / "atlas.json", folder_path / "atlas.md"
+        write_text(json_path, json.dumps(self.to_dict(), indent=1, allow_nan=False) + "\n")
+        write_text(page_path, markdown_page(self.cases, pictures))
+        return [json_path, page_path, *(self.plot(folder_path) if pictures else ())]
 
 
 def stability(
     cases: Iterable[str] | None = None,
     *,
-    points: int = POINTS,
-    tolerance: float = TOLERANCE,
+    points: int = GRID_POINTS,
+    tolerance: float = BRACKET_TOLERANCE,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> Atlas:
     """Find the parameter values at which methods fail, and the range of each remedy.
@@ -78,17 +78,17 @@ def stability(
     case without its packages.
     """
     if isinstance(cases, str) or (cases is not None and not isinstance(cases, Iterable)):
-        raise SceneError(f"cases = {short(cases)}: expected a list of names")
+        raise SceneError(f"cases = {abbreviate(cases)}: expected a list of names")
     if isinstance(points, bool) or not isinstance(points, int) or not 3 <= points <= 1000:
         raise SceneError(f"points = {points!r}: expected a whole number from 3 to 1000")
     if not 0 < tolerance < 1:
         raise SceneError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
-    found = []
-    definitions = known.chosen(None if cases is None else list(cases))
+    measured_cases = []
+    definitions = known.select_cases(None if cases is None else list(cases))
     if cases is None:
-        definitions = tuple(one for one in definitions if not one.lacks)
+        definitions = tuple(definition for definition in definitions if not definition.lacks)
     for number, definition in enumerate(definitions):
         if progress is not None:
             progress(definition.name, number, len(definitions))
-        found.append(measure(definition, points, tolerance))
-    return Atlas(tuple(found))
+        measured_cases.append(measure_case(definition, points, tolerance))
+    return Atlas(tuple(measured_cases))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ..errors import NumericalFailure
-from .scale import Scale
+from .parameter_scale import Scale
 
 Points = tuple[tuple[float, float], ...]
 
@@ -27,7 +27,7 @@ class Frontier:
     points: Points
 
 
-class Tried:
+class MeasuredMethod:
     """Measured values of a method by parameter, each computed once."""
 
     def __init__(self, measure: Callable[[float], float], limit: float) -> None:
@@ -38,10 +38,10 @@ class Tried:
         """Whether the measured value is within the limit; no answer counts as a failure."""
         if value not in self._found:
             try:
-                found = float(self._measure(value))
+                measured = float(self._measure(value))
             except NumericalFailure:
-                found = math.inf
-            self._found[value] = found if math.isfinite(found) else math.inf
+                measured = math.inf
+            self._found[value] = measured if math.isfinite(measured) else math.inf
         return self._found[value] <= self._limit
 
     def points(self) -> Points:
@@ -49,43 +49,52 @@ class Tried:
         return tuple(sorted(self._found.items()))
 
 
-def bracketed(tried: Tried, values: Sequence[float], scale: Scale, tolerance: float) -> Frontier:
+def find_frontier(
+    tried: MeasuredMethod, values: Sequence[float], scale: Scale, tolerance: float
+) -> Frontier:
     """Find the frontier along `values`, where the first must hold and the last must fail.
 
     Raises NumericalFailure otherwise.
     """
-    sides = [tried.holds(value) for value in values]
-    if not sides[0] or sides[-1]:
-        said = "holds" if sides[0] else "fails"
+    outcomes = [tried.holds(value) for value in values]
+    if not outcomes[0] or outcomes[-1]:
+        outcome = "holds" if outcomes[0] else "fails"
         raise NumericalFailure(
-            f"no frontier between {values[0]:g} and {values[-1]:g}: the method {said} at both ends"
+            f"no frontier between {values[0]:g} and {values[-1]:g}: the method {outcome} at both "
+            f"ends"
         )
-    return _first(tried, values, sides, scale, tolerance)
+    return _bisect_first_change(tried, values, outcomes, scale, tolerance)
 
 
-def outwards(tried: Tried, values: Sequence[float], scale: Scale, tolerance: float) -> Frontier:
+def find_end(
+    tried: MeasuredMethod, values: Sequence[float], scale: Scale, tolerance: float
+) -> Frontier:
     """Find how far along `values` a method holds; it must hold at the first.
 
     Raises NumericalFailure otherwise.
     """
-    sides = [tried.holds(value) for value in values]
-    if not sides[0]:
+    outcomes = [tried.holds(value) for value in values]
+    if not outcomes[0]:
         raise NumericalFailure(f"the remedy fails where the method does, at {values[0]:g}")
-    if all(sides):
+    if all(outcomes):
         return Frontier(values[-1], None, True, tried.points())
-    return _first(tried, values, sides, scale, tolerance)
+    return _bisect_first_change(tried, values, outcomes, scale, tolerance)
 
 
-def _first(
-    tried: Tried, values: Sequence[float], sides: Sequence[bool], scale: Scale, tolerance: float
+def _bisect_first_change(
+    tried: MeasuredMethod,
+    values: Sequence[float],
+    sides: Sequence[bool],
+    scale: Scale,
+    tolerance: float,
 ) -> Frontier:
     """Bisect the first interval of `values` that changes sides, down to `tolerance`."""
     changes = sum(a != b for a, b in pairwise(sides))
-    place = sides.index(False)
-    good, bad = values[place - 1], values[place]
-    while (half := scale.middle(good, bad, tolerance)) is not None:
-        if tried.holds(half):
-            good = half
+    first_failure = sides.index(False)
+    holding_value, failing_value = values[first_failure - 1], values[first_failure]
+    while (midpoint := scale.middle(holding_value, failing_value, tolerance)) is not None:
+        if tried.holds(midpoint):
+            holding_value = midpoint
         else:
-            bad = half
-    return Frontier(good, bad, changes == 1, tried.points())
+            failing_value = midpoint
+    return Frontier(holding_value, failing_value, changes == 1, tried.points())

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .found import Found
+from .case_result import CaseResult
 
-HEAD = """\
+INTRODUCTION = """\
 # Failure atlas: limits of numerical methods
 
 Atlas of failures, written by `mstmm stability --out DIR`. Every frontier is measured in that run,
@@ -22,27 +22,27 @@ _ROW = (
 )
 
 
-def page(cases: Sequence[Found], pictures: bool) -> str:
+def markdown_page(cases: Sequence[CaseResult], pictures: bool) -> str:
     """Whole page; with `pictures` it refers to NAME.png for each case, in the same folder."""
-    rows = "\n".join(_ROW.format(**_row(case)) for case in cases)
+    rows = "\n".join(_ROW.format(**_table_row(case)) for case in cases)
     head = f"| {' | '.join(_HEADINGS)} |\n|{'---|' * len(_HEADINGS)}"
-    parts = "\n".join(_part(case, pictures) for case in cases)
-    return f"{HEAD}\n{head}\n{rows}\n\n{parts}"
+    case_sections = "\n".join(_section(case, pictures) for case in cases)
+    return f"{INTRODUCTION}\n{head}\n{rows}\n\n{case_sections}"
 
 
-def _row(case: Found) -> dict[str, str]:
+def _table_row(case: CaseResult) -> dict[str, str]:
     return {
         "name": case.name,
-        "parameter": in_unit(case),
+        "parameter": parameter_with_unit(case),
         "measured": case.measured,
-        "limit": limit(case),
-        "frontier": frontier(case),
+        "limit": limit_text(case),
+        "frontier": frontier_text(case),
         "remedy": case.remedy,
-        "reach": held_to(case),
+        "reach": remedy_range(case),
     }
 
 
-def number(value: float, digits: int = 3) -> str:
+def format_number(value: float, digits: int = 3) -> str:
     """Format a number in common notation: 2.67e6, 1e5, and short ones in full."""
     if value == round(value) and abs(value) < 1000:
         return f"{value:.0f}"
@@ -50,48 +50,49 @@ def number(value: float, digits: int = 3) -> str:
     return f"{mantissa}e{int(power)}" if power else mantissa
 
 
-def in_unit(case: Found) -> str:
+def parameter_with_unit(case: CaseResult) -> str:
     """Parameter of a case with its unit."""
     return f"{case.parameter} in {case.unit}" if case.unit else case.parameter
 
 
-def frontier(case: Found) -> str:
+def frontier_text(case: CaseResult) -> str:
     """Name of the method, and where it starts to fail."""
-    step = "up" if case.fails == "above" else "down"
-    return f"{case.method}, from {number(case.fails_at)} {step}"
+    direction = "up" if case.fails == "above" else "down"
+    return f"{case.method}, from {format_number(case.fails_at)} {direction}"
 
 
-def limit(case: Found) -> str:
+def limit_text(case: CaseResult) -> str:
     """Limit of the error measure, above which a method fails."""
-    return number(case.limit)
+    return format_number(case.limit)
 
 
-def tried_to(case: Found) -> float:
+def tested_range(case: CaseResult) -> float:
     """End of the range measured for the method, on the side on which it fails."""
-    ends = [at for at, _ in case.points]
-    return max(ends) if case.fails == "above" else min(ends)
+    parameters = [parameter for parameter, _ in case.points]
+    return max(parameters) if case.fails == "above" else min(parameters)
 
 
-def held_to(case: Found) -> str:
+def remedy_range(case: CaseResult) -> str:
     """How far the remedy holds, with "(end)" if that is the end of the measured range."""
-    return number(case.remedy_holds_to) + (" (end)" if case.remedy_fails_at is None else "")
+    return format_number(case.remedy_holds_to) + (" (end)" if case.remedy_fails_at is None else "")
 
 
-def _part(case: Found, pictures: bool) -> str:
+def _section(case: CaseResult, pictures: bool) -> str:
     lines = [f"## {case.name}", "", f"*{case.title}.* {case.why}", ""]
     if pictures:
         lines += [f"![{case.title}]({case.name}.png)", ""]
-    lines += [_judged(case), "", f"Source: {case.source}.", ""]
+    lines += [_result_list(case), "", f"Source: {case.source}.", ""]
     return "\n".join(lines)
 
 
-def _judged(case: Found) -> str:
-    chance = "" if case.monotone else "; beyond it holds in places, by chance"
+def _result_list(case: CaseResult) -> str:
+    remark = "" if case.monotone else "; beyond it holds in places, by chance"
     end = case.remedy_fails_at
-    beyond = "the end of the range" if end is None else f"fails at {number(end, 4)}"
+    end_text = "the end of the range" if end is None else f"fails at {format_number(end, 4)}"
     return (
-        f"- measured: {case.measured}; a failure above {limit(case)}\n"
-        f"- {case.method}: holds at {number(case.holds_at, 4)}, fails at "
-        f"{number(case.fails_at, 4)}{chance}; tried to {number(tried_to(case), 4)}\n"
-        f"- {case.remedy}: holds to {number(case.remedy_holds_to, 4)}, {beyond}"
+        f"- measured: {case.measured}; a failure above {limit_text(case)}\n"
+        f"- {case.method}: holds at {format_number(case.holds_at, 4)}, fails at "
+        f"{format_number(case.fails_at, 4)}{remark}; tried to "
+        f"{format_number(tested_range(case), 4)}\n"
+        f"- {case.remedy}: holds to {format_number(case.remedy_holds_to, 4)}, {end_text}"
     )

@@ -15,20 +15,20 @@ from .demo import demo
 from .doctor import doctor
 from .export_robot import export_robot
 from .generate import generate
+from .graphics.plot import plot
+from .graphics.report import report
+from .graphics.view import view
 from .import_robot import import_robot
-from .listing import list_elements
-from .pictures.plot import plot
-from .pictures.report import report
-from .pictures.view import view
+from .list_elements import list_elements
 from .show import show
-from .simulating.command import simulate
+from .simulate.command import simulate
 from .studies.advise import advise
 from .studies.chart import chart
 from .studies.linear import frf, linearize, modes
 from .studies.stability import stability
 
 
-class Commands(TyperGroup):
+class CommandGroup(TyperGroup):
     """Group of the commands, which reports an interrupt, where typer would exit silently."""
 
     def invoke(self, ctx: Any) -> Any:
@@ -40,7 +40,7 @@ class Commands(TyperGroup):
 
 app = typer.Typer(
     name="mstmm",
-    cls=Commands,
+    cls=CommandGroup,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -50,13 +50,13 @@ app = typer.Typer(
 )
 
 
-def _version(wanted: bool) -> None:
+def _print_version(wanted: bool) -> None:
     if wanted:
         from mstmm.version import __version__
 
-        from .output import say
+        from .terminal_output import print_lines
 
-        say(f"mstmm {__version__}")
+        print_lines(f"mstmm {__version__}")
         raise typer.Exit(0)
 
 
@@ -65,14 +65,16 @@ def mstmm(
     context: typer.Context,
     version: Annotated[
         bool,
-        typer.Option("--version", is_eager=True, callback=_version, help="Print the version."),
+        typer.Option(
+            "--version", is_eager=True, callback=_print_version, help="Print the version."
+        ),
     ] = False,
 ) -> None:
     """Multibody dynamics with transfer matrices: derive, generate, simulate."""
     if context.invoked_subcommand is None:
-        from .output import put
+        from .terminal_output import write_stdout
 
-        put(context.get_help())
+        write_stdout(context.get_help())
 
 
 app.command("demo")(demo)

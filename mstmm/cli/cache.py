@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .explain import ENVIRONMENT
-from .options import Json, not_negative, quoted
+from .error_messages import ENVIRONMENT
+from .options import Json, parse_not_negative, quote
 
 if TYPE_CHECKING:
-    from mstmm.runtime.libraries.upkeep import Listed
+    from mstmm.runtime.libraries.cache_maintenance import ListedEntry
 
 ACTIONS = ("list", "verify", "clean")
 
@@ -32,7 +32,7 @@ def cache(
         typer.Option(
             "--unused",
             metavar="DAYS",
-            parser=not_negative,
+            parser=parse_not_negative,
             help="clean: delete only entries unused for this many days.",
         ),
     ] = 0.0,
@@ -40,39 +40,41 @@ def cache(
 ) -> None:
     """List, verify or delete compiled scene libraries."""
     if action not in ACTIONS:
-        raise typer.BadParameter(f"{quoted(action)}: expected {', '.join(ACTIONS)}")
+        raise typer.BadParameter(f"{quote(action)}: expected {', '.join(ACTIONS)}")
     if unused and action != "clean":
         raise typer.BadParameter("--unused requires clean")
-    from mstmm.runtime.libraries.folder import private_folder
+    from mstmm.runtime.libraries.cache_folder import private_folder
 
     folder = private_folder()
     if action == "clean":
-        _clean(folder, unused, json)
+        _delete_entries(folder, unused, json)
     else:
-        _list(folder, json, verify=action == "verify")
+        _list_entries(folder, json, verify=action == "verify")
 
 
-def _list(folder: Path, json: bool, verify: bool) -> None:
-    from mstmm.runtime.libraries.folder import limit
-    from mstmm.runtime.libraries.upkeep import listed, unfinished
+def _list_entries(folder: Path, json: bool, verify: bool) -> None:
+    from mstmm.runtime.libraries.cache_folder import size_limit
+    from mstmm.runtime.libraries.cache_maintenance import count_unfinished_builds, list_entries
 
-    from . import output
+    from . import terminal_output
 
-    entries, cut_off = listed(folder), unfinished(folder)
+    entries, unfinished_count = list_entries(folder), count_unfinished_builds(folder)
     damaged = [entry for entry in entries if entry.problem]
     size = sum(entry.bytes for entry in entries)
     if json:
-        output.emit_json({
-            "ok": not damaged, "folder": str(folder), "bytes": size, "limit": limit(),
-            "unfinished": cut_off, "entries": [_plain(entry) for entry in entries],
+        terminal_output.print_json({
+            "ok": not damaged, "folder": str(folder), "bytes": size, "limit": size_limit(),
+            "unfinished": unfinished_count, "entries": [_entry_data(entry) for entry in entries],
         })  # fmt: skip
     else:
         if not verify and entries:
             columns = ("library", "kB>", "last used", "compiled in s>", "compiler", "state")
-            output.console().print(output.table("", columns, map(_row, entries)))
-        _sum_up(folder, entries, size, limit(), cut_off)
+            terminal_output.table_console().print(
+                terminal_output.build_table("", columns, map(_entry_row, entries))
+            )
+        _print_summary(folder, entries, size, size_limit(), unfinished_count)
         for entry in damaged:
-            output.complain(
+            terminal_output.print_error(
                 f"{entry.folder.name} is corrupt: {entry.problem}; it is rebuilt when used; "
                 "mstmm cache clean deletes it"
             )
@@ -80,43 +82,53 @@ def _list(folder: Path, json: bool, verify: bool) -> None:
         raise typer.Exit(ENVIRONMENT)
 
 
-def _sum_up(folder: Path, entries: list[Listed], size: int, limit: int, cut_off: int) -> None:
-    from . import output
-    from .summary import count
+def _print_summary(
+    folder: Path, entries: list[ListedEntry], size: int, limit: int, cut_off: int
+) -> None:
+    from . import terminal_output
+    from .run_summary import count_text
 
-    whole = sum(1 for entry in entries if not entry.problem)
-    output.say(
-        f"{folder}: {count(len(entries), 'library', 'libraries')}, {whole} intact; "
+    intact_count = sum(1 for entry in entries if not entry.problem)
+    terminal_output.print_lines(
+        f"{folder}: {count_text(len(entries), 'library', 'libraries')}, {intact_count} intact; "
         f"{size / 1e6:.1f} of {limit / 1e6:.0f} MB"
     )
     if cut_off:
-        output.say(f"{count(cut_off, 'build', 'builds')} in progress or interrupted")
-
-
-def _clean(folder: Path, unused: float, json: bool) -> None:
-    from mstmm.runtime.libraries.upkeep import clean
-
-    from . import output
-    from .summary import count
-
-    removed, size = clean(folder, unused * _DAY)
-    if json:
-        output.emit_json({"ok": True, "folder": str(folder), "removed": removed, "bytes": size})
-    else:
-        output.say(
-            f"{folder}: deleted {count(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
+        terminal_output.print_lines(
+            f"{count_text(cut_off, 'build', 'builds')} in progress or interrupted"
         )
 
 
-def _row(entry: Listed) -> tuple[str, ...]:
-    when = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.used))
+def _delete_entries(folder: Path, unused: float, json: bool) -> None:
+    from mstmm.runtime.libraries.cache_maintenance import clean_cache
+
+    from . import terminal_output
+    from .run_summary import count_text
+
+    removed, size = clean_cache(folder, unused * _DAY)
+    if json:
+        terminal_output.print_json(
+            {"ok": True, "folder": str(folder), "removed": removed, "bytes": size}
+        )
+    else:
+        terminal_output.print_lines(
+            f"{folder}: deleted {count_text(removed, 'library', 'libraries')}, {size / 1e6:.1f} MB"
+        )
+
+
+def _entry_row(entry: ListedEntry) -> tuple[str, ...]:
+    last_used = time.strftime("%Y-%m-%d %H:%M", time.localtime(entry.used))
     return (
-        entry.folder.name, f"{entry.bytes / 1e3:.0f}", when, str(entry.about.get("seconds", "")),
-        str(entry.about.get("compiler_version", "")), entry.problem or "intact",
-    )  # fmt: skip
+        entry.folder.name,
+        f"{entry.bytes / 1e3:.0f}",
+        last_used,
+        str(entry.about.get("seconds", "")),
+        str(entry.about.get("compiler_version", "")),
+        entry.problem or "intact",
+    )
 
 
-def _plain(entry: Listed) -> dict[str, Any]:
+def _entry_data(entry: ListedEntry) -> dict[str, Any]:
     return {
         "name": entry.folder.name, "bytes": entry.bytes, "last_used": entry.used,
         "problem": entry.problem, **entry.about,

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mstmm.errors import ElementError, MstmmError, OpenLoop
+from mstmm.errors import ElementError, LoopClosureError, MstmmError
 
-from .options import Json, python_file, quoted
+from .options import Json, quote, require_python_file
 
 if TYPE_CHECKING:
-    from mstmm.bridge.crosscheck import Report as Crosscheck
-    from mstmm.runtime.engine.loops.closed import Loops
+    from mstmm.pipeline.crosscheck import CrossCheckReport as Crosscheck
+    from mstmm.runtime.engine.loops.loop_analysis import LoopAnalysis
     from mstmm.runtime.model.model import Model
     from mstmm.scene import Scene
     from mstmm.scene.checks.topology import Topology
@@ -48,69 +48,69 @@ def check(
     json: Json = False,
 ) -> None:
     """Validate scenes and element definitions, and verify kernels against their equations."""
-    from .explain import explain
-    from .output import complain, emit_json, say
+    from .error_messages import message_and_code
+    from .terminal_output import print_error, print_json, print_lines
 
     if hinge:
-        from .models import use_files
+        from .model_loading import generate_elements
 
-        use_files(hinge)
+        generate_elements(hinge)
     reports: list[Report] = []
-    worst = 0
-    for each in what:
+    highest_code = 0
+    for name in what:
         try:
-            report = _checker(each)(each)
+            report = _check_function(name)(name)
             text, model = report.pop("text"), report.pop("model", None)
             if assembled and model is not None:
-                report["toml"] = _assembled(model)
+                report["toml"] = _assembled_toml(model)
             if (echo or assembled) and "toml" in report:
                 text = report["toml"].rstrip("\n")
             if not json:
-                say(text)
+                print_lines(text)
         except MstmmError as error:
-            message, code = explain(error)
-            worst = max(worst, code)
+            message, code = message_and_code(error)
+            highest_code = max(highest_code, code)
             report = {"ok": False, "message": message, "exit_code": code}
-            if isinstance(error, OpenLoop):
+            if isinstance(error, LoopClosureError):
                 report |= {"gap": error.gap, "nearest_pose": error.pose}
-                message = "\n".join([message, *_pose_lines(each, error)])
-            complain(message)
-        reports.append({"name": each, **report})
+                message = "\n".join([message, *_pose_lines(name, error)])
+            print_error(message)
+        reports.append({"name": name, **report})
     if json:
-        emit_json({"ok": worst == 0, "checked": reports})
-    if worst:
-        raise typer.Exit(worst)
+        print_json({"ok": highest_code == 0, "checked": reports})
+    if highest_code:
+        raise typer.Exit(highest_code)
 
 
-def _checker(what: str) -> Callable[[str], Report]:
+def _check_function(what: str) -> Callable[[str], Report]:
     from mstmm.scene.load import is_scene_file
 
     ending = os.path.splitext(what)[1].lower()
     if is_scene_file(what):
-        return _scene
+        return _check_scene
     if ending == ".py":
-        return _file
+        return _check_file
     if not what or ending or "/" in what or "\0" in what or os.path.exists(what):
         raise MstmmError(
-            f"{quoted(what)}: expected a scene (.toml or .json), a Python file (.py) with elements,"
+            f"{quote(what)}: expected a scene (.toml or .json), a Python file (.py) with elements,"
             " or the name of an element; mstmm list shows the names"
         )
-    return _element
+    return _check_element
 
 
 # --- scenes ---------------------------------------------------------------------------------------
 
 
-def _scene(path: str) -> Report:
+def _check_scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
-    from mstmm.runtime.pack.merge.simplification import COUNTED
-    from mstmm.runtime.run.stability import find_fastest_motion
+    from mstmm.runtime.packing.merging.simplification import COUNTED
+    from mstmm.runtime.run.step_stability import find_fastest_motion
 
-    from .models import compiled
+    from .model_loading import compile_file
 
     scene = mstmm.load_scene(path)
-    model = compiled(path, scene)
+    model = compile_file(path, scene)
     sizes = {
         "bodies": len(scene.bodies), "beams": len(scene.beam), "elastic": len(scene.elastic),
         "hinges": len(scene.hinges), "coordinates": model.nq, "speeds": model.nu,
@@ -120,11 +120,11 @@ def _scene(path: str) -> Report:
     notes = [f"{name}: {note}" for name, body in model.flexible.items() for note in body.notes]
     notes += [str(one) for one in model.simplifications if one.kind in COUNTED]
     warnings = [*scene.warnings, *(w for body in model.flexible.values() for w in body.warnings)]
-    small = model.nu <= _EXAMINED
-    fastest = find_fastest_motion(model.looped, *model.initial_state()) if small else None
+    is_examined = model.nu <= _MAX_EXAMINED_SPEEDS
+    fastest = find_fastest_motion(model.looped, *model.initial_state()) if is_examined else None
     report = {
         "ok": True, "kind": "scene", **sizes, "warnings": warnings, "choices": notes,
-        "loops": _loops(model.loops),
+        "loops": _loop_data(model.loops),
         "fastest": None if fastest is None else {"rate": fastest[0], "element": fastest[1]},
     }  # fmt: skip
     lines = [_scene_text(path, scene, sizes, warnings, notes), *_loop_lines(model.loops)]
@@ -135,87 +135,87 @@ def _scene(path: str) -> Report:
 
 
 #: Largest number of speeds for which the fastest motion is determined.
-_EXAMINED = 10_000
+_MAX_EXAMINED_SPEEDS = 10_000
 
 #: Rate (1/s) of a motion above which explicit methods need many steps.
-_FAST = 1e4
+_MIN_FAST_RATE = 1e4
 
 
 def _fastest_line(rate: float, element: str) -> str:
     """Line with the fastest motion at the start, and its step limit for explicit methods."""
     line = f"  fastest motion at the start: {rate:.3g} 1/s, by {element}"
-    if rate < _FAST:
+    if rate < _MIN_FAST_RATE:
         return line
     return f"{line}; explicit methods need at least {rate / 6:.1g} steps per second: --method auto"
 
 
-def _assembled(model: Model) -> str:
-    from mstmm.bridge.assembled import assembled
+def _assembled_toml(model: Model) -> str:
+    from mstmm.pipeline.assembled_scene import assembled_scene
 
-    return assembled(model).to_toml()
+    return assembled_scene(model).to_toml()
 
 
-_ONE = {
+_SINGULAR_NOUNS = {
     "bodies": "body", "beams": "beam", "elastic": "elastic body", "hinges": "hinge",
     "coordinates": "coordinate", "speeds": "speed", "springs": "spring", "bushings": "bushing",
     "loads": "load", "events": "event",
 }  # fmt: skip
 
 
-_MANY = {"elastic": "elastic bodies"}
+_PLURAL_NOUNS = {"elastic": "elastic bodies"}
 
 
 def _scene_text(
     path: str, scene: Scene, sizes: dict[str, int], warnings: list[str], choices: list[str]
 ) -> str:
-    from . import summary
+    from . import run_summary
 
-    said = ", ".join(
-        summary.count(number, _ONE[name], _MANY.get(name, name))
+    counts = ", ".join(
+        run_summary.count_text(number, _SINGULAR_NOUNS[name], _PLURAL_NOUNS.get(name, name))
         for name, number in sizes.items()
         if number
     )
-    lines = [f"{path}: ok; {said or 'empty scene'}", *(f"  note: {w}" for w in warnings)]
+    lines = [f"{path}: ok; {counts or 'empty scene'}", *(f"  note: {w}" for w in warnings)]
     lines += [f"  {choice}" for choice in choices]
     return "\n".join(lines + _tree_lines(scene))
 
 
 #: Largest number of bodies, loops and coordinates that are listed.
-_SHOWN = 40
+_MAX_SHOWN = 40
 
 
 def _tree_lines(scene: Scene) -> list[str]:
     """Lines of the tree of bodies, each with its inboard hinge."""
-    from mstmm.scene.checks.topology import build
+    from mstmm.scene.checks.topology import build_topology
 
     skeleton = scene.skeleton
-    tree = build(skeleton)
+    tree = build_topology(skeleton)
     depth: dict[int, int] = {-1: 0}  # of bodies that may carry others
     lines = ["  ground"] if tree.runs else []
-    shown = 0
+    shown_count = 0
     for run in tree.runs:
-        if len(lines) > _SHOWN:
+        if len(lines) > _MAX_SHOWN:
             break
-        first = 1 + _depth(tree, depth, run.parent)
+        first = 1 + _tree_depth(tree, depth, run.parent)
         depth[run.place] = first
         hinge, body = skeleton.hinges[run.hinge], skeleton.bodies[run.body]
-        what = f"{body.name}  ({hinge.name}: {hinge.type})"
+        description = f"{body.name}  ({hinge.name}: {hinge.type})"
         if run.count > 1:
             last = skeleton.bodies.name(run.body + run.count - 1)
-            what = f"{body.name} to {last}  ({hinge.type})"
-        lines.append("  " + "  " * min(first, 20) + what)
-        shown += run.count
-    if shown < tree.count:
-        lines.append(f"  ... and {tree.count - shown} more bodies")
-    for number in tree.cut[:_SHOWN]:
+            description = f"{body.name} to {last}  ({hinge.type})"
+        lines.append("  " + "  " * min(first, 20) + description)
+        shown_count += run.count
+    if shown_count < tree.count:
+        lines.append(f"  ... and {tree.count - shown_count} more bodies")
+    for number in tree.cut[:_MAX_SHOWN]:
         cut = skeleton.hinges[number]
         lines.append(f"  {cut.name}: {cut.type} closes a loop: {cut.inboard} - {cut.outboard}")
-    if len(tree.cut) > _SHOWN:
-        lines.append(f"  ... and {len(tree.cut) - _SHOWN} more loops")
+    if len(tree.cut) > _MAX_SHOWN:
+        lines.append(f"  ... and {len(tree.cut) - _MAX_SHOWN} more loops")
     return lines
 
 
-def _loops(loops: Loops) -> Report | None:
+def _loop_data(loops: LoopAnalysis) -> Report | None:
     """Data of `model.loops`, for JSON; None without closed loops."""
     if not loops.rows:
         return None
@@ -224,23 +224,23 @@ def _loops(loops: Loops) -> Report | None:
         "rows": len(loops.rows), "rank": loops.rank, "mobility": loops.mobility,
         "shapes": loops.shapes, "cut": list(loops.cut),
         "dropped": [
-            {"of": of, "direction": word, "momentary": (of, word) in loops.momentary}
-            for of, word in loops.redundant
+            {"of": owner, "direction": word, "momentary": (owner, word) in loops.momentary}
+            for owner, word in loops.redundant
         ],
         "singular": loops.singular, "nearby": loops.nearby,
         "misfit": {"gap": gap, "of": name, "direction": direction} if name else None,
         "reactions_unique": not loops.not_unique,
-        "not_unique": {of: list(words) for of, words in loops.not_unique.items()},
+        "not_unique": {owner: list(words) for owner, words in loops.not_unique.items()},
     }  # fmt: skip
 
 
-def _loop_lines(loops: Loops) -> list[str]:
+def _loop_lines(loops: LoopAnalysis) -> list[str]:
     """Lines about closed loops: rank, mobility, redundant rows, indeterminate loads."""
     if not loops.rows:
         return []
     lines = [f"  loops: {loops.counted}"]
     if loops.redundant:
-        lines.append(f"  loops: redundant rows: {loops.repeated(_SHOWN)}")
+        lines.append(f"  loops: redundant rows: {loops.repeated(_MAX_SHOWN)}")
     if loops.singular:
         lines.append(
             f"  loops: the start is a singular configuration: {loops.rank} independent rows "
@@ -257,51 +257,51 @@ def _loop_lines(loops: Loops) -> list[str]:
     return lines
 
 
-def _pose_lines(path: str, error: OpenLoop) -> list[str]:
+def _pose_lines(path: str, error: LoopClosureError) -> list[str]:
     """Lines with the nearest pose of a loop that cannot be closed, and how to display it."""
     lines = [
         f"  nearest pose: {name}: q = {', '.join(f'{x:.6g}' for x in q)}"
-        for name, q in list(error.pose.items())[:_SHOWN]
+        for name, q in list(error.pose.items())[:_MAX_SHOWN]
     ]
-    more = len(error.pose) - len(lines)
-    lines += [f"  ... and {more} more"] if more > 0 else []
-    return [*lines, f"  to display it: mstmm view {quoted(path)}"]
+    rest_count = len(error.pose) - len(lines)
+    lines += [f"  ... and {rest_count} more"] if rest_count > 0 else []
+    return [*lines, f"  to display it: mstmm view {quote(path)}"]
 
 
-def _depth(tree: Topology, depth: dict[int, int], place: int) -> int:
+def _tree_depth(tree: Topology, depth: dict[int, int], place: int) -> int:
     """Depth of a body in the tree; `depth` has that of the first body of every run."""
-    first = max((p for p in depth if p <= place), default=-1)
-    return depth[first] + place - first if first >= 0 else 0
+    run_start = max((p for p in depth if p <= place), default=-1)
+    return depth[run_start] + place - run_start if run_start >= 0 else 0
 
 
 # --- elements -------------------------------------------------------------------------------------
 
 
-def _element(name: str) -> Report:
+def _check_element(name: str) -> Report:
     """Cross-check a built-in or stored element: equations, intermediate representation and C."""
-    from mstmm.bridge.crosscheck import crosscheck
+    from mstmm.pipeline.crosscheck import crosscheck
 
-    from .names import found
+    from .element_names import find_element
 
-    return _report([crosscheck(*found(name))])
+    return _crosscheck_report([crosscheck(*find_element(name))])
 
 
-def _file(path: str) -> Report:
+def _check_file(path: str) -> Report:
     """Cross-check every element that a Python file defines; the file is executed."""
-    from mstmm.bridge.crosscheck import crosscheck_definition
-    from mstmm.derive.audit.definition import check as check_element
     from mstmm.derive.catalogue.registry import load_file
+    from mstmm.derive.verification.definition_checks import check_element
+    from mstmm.pipeline.crosscheck import crosscheck_definition
 
     reports = []
-    for element in load_file(python_file(path)):
+    for element in load_file(require_python_file(path)):
         check_element(element)
         reports.append(crosscheck_definition(element))
-    return _report(reports)
+    return _crosscheck_report(reports)
 
 
-def _report(reports: list[Crosscheck]) -> Report:
-    wrong = [report for report in reports if not report.passed]
-    if wrong:
-        raise ElementError("\n".join(str(report) for report in wrong))
+def _crosscheck_report(reports: list[Crosscheck]) -> Report:
+    failed = [report for report in reports if not report.passed]
+    if failed:
+        raise ElementError("\n".join(str(report) for report in failed))
     text = "\n".join(str(report) for report in reports)
     return {"ok": True, "elements": [report.to_json() for report in reports], "text": text}

@@ -7,10 +7,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .extras import install, missing, result_ending
-from .models import load_method
+from .extra_checks import install_command, missing_packages, result_ending
+from .model_loading import load_method
 from .options import Json, output_file
-from .progress import bar
+from .progress import progress_bar
 
 if TYPE_CHECKING:
     from mstmm.runtime.result.result import Result
@@ -20,11 +20,17 @@ SCENE = "three_bodies_on_balls.toml"
 TITLE = "Three bodies on ball hinges"
 T_END, SAMPLES = 5.0, 501
 
-TABLE = ("body3.tip.x", "body3.tip.y", "body3.tip.z", "ball0.fz", "energy")
-TRAIL = "body3.tip"
-PICTURE = ("body3.tip.position", "ball0.force", "energy.kinetic", "energy.gravity", "energy")
+TABLE_QUANTITIES = ("body3.tip.x", "body3.tip.y", "body3.tip.z", "ball0.fz", "energy")
+TRAIL_END = "body3.tip"
+PLOT_QUANTITIES = (
+    "body3.tip.position",
+    "ball0.force",
+    "energy.kinetic",
+    "energy.gravity",
+    "energy",
+)
 
-ABOUT = """\
+INTRODUCTION = """\
 Three bodies on ball hinges, a chain swinging in space under gravity:
 
     ground --(ball0)-- body1 --(ball2)-- body2 --(ball4)-- body3 -- tip
@@ -34,7 +40,7 @@ Wiley 2019, section 5.10.1, with different data.  Each body and hinge is one
 element; its equations were derived symbolically, printed as C and compiled when
 mstmm was installed.  One sweep along the chain gives all accelerations."""
 
-NEXT = """\
+NEXT_STEPS = """\
 Next:
     mstmm simulate demo.toml --t-end 2     simulate the scene, after editing it
     mstmm show ball                        show the equations of a hinge
@@ -48,57 +54,59 @@ def scene_text() -> str:
 
 def demo(json: Json = False) -> None:
     """Run an example and write its result, plots, animation and table to the current folder."""
-    from mstmm.runtime.host.files import write_text
+    from mstmm.runtime.platform_support.safe_files import write_text
 
-    from . import output, summary
+    from . import run_summary, terminal_output
 
-    scene, result_file, table_file, picture, moving = _targets()
-    kept = _write_scene(scene)
+    scene, result_file, table_file, picture, animation = _output_files()
+    kept_note = _write_scene(scene)
     result, seconds = _simulate(scene_text())
     verdict = result.certificate.verdict()
     text = "\n".join([
-        ABOUT, "", *summary.verdict_lines(verdict, 80),
-        f"{summary.sizes(result)}", summary.effort(result, seconds), "",
-        result.table(*TABLE, rows=11), "", *summary.certificate_lines(result, 80),
+        INTRODUCTION, "", *run_summary.verdict_lines(verdict, 80),
+        f"{run_summary.size_text(result)}", run_summary.effort_text(result, seconds), "",
+        result.table(*TABLE_QUANTITIES, rows=11), "", *run_summary.certificate_lines(result, 80),
     ])  # fmt: skip
     result.save(result_file)
     write_text(table_file, text + "\n")
     if picture is not None:
-        result.plot(*PICTURE, path=picture, title=TITLE)
-    if moving is not None:
-        result.view(moving, trails=(TRAIL,), title=TITLE)
-    made = {
+        result.plot(*PLOT_QUANTITIES, path=picture, title=TITLE)
+    if animation is not None:
+        result.view(animation, trails=(TRAIL_END,), title=TITLE)
+    descriptions = {
         result_file: f"the result: {len(result.t)} samples of every quantity",
         table_file: "this text",
-        scene: "the scene" if kept is None else kept,
+        scene: "the scene" if kept_note is None else kept_note,
     } | ({} if picture is None else {picture: "plots of the result"})
-    made |= {} if moving is None else {moving: "an animation of the chain, for any browser"}
+    descriptions |= (
+        {} if animation is None else {animation: "an animation of the chain, for any browser"}
+    )
     if json:
-        data = summary.to_json(result, seconds, verdict)
-        output.emit_json({**data, "files": [str(path) for path in made]})
+        data = run_summary.to_json(result, seconds, verdict)
+        terminal_output.print_json({**data, "files": [str(path) for path in descriptions]})
         return
-    output.say(text)
-    output.say()
-    for path, what in made.items():
-        output.say(f"{path!s:<11}{what}")
-    for line in _without_extras():
-        output.say(line)
-    output.say()
-    output.say(NEXT)
+    terminal_output.print_lines(text)
+    terminal_output.print_lines()
+    for path, description in descriptions.items():
+        terminal_output.print_lines(f"{path!s:<11}{description}")
+    for line in _missing_extra_lines():
+        terminal_output.print_lines(line)
+    terminal_output.print_lines()
+    terminal_output.print_lines(NEXT_STEPS)
 
 
-def _targets() -> tuple[Path, Path, Path, Path | None, Path | None]:
+def _output_files() -> tuple[Path, Path, Path, Path | None, Path | None]:
     """Output files: scene, result, table, plot, animation; None if a package is missing."""
     names = ["demo.toml", "demo" + result_ending(), "demo.txt"]
     scene, result, table = (output_file(name, (), "demo:") for name in names)
-    picture = None if missing("plot") else output_file("demo.png", (), "demo:")
-    moving = None if missing("view") else output_file("demo.html", (), "demo:")
-    return scene, result, table, picture, moving
+    picture = None if missing_packages("plot") else output_file("demo.png", (), "demo:")
+    animation = None if missing_packages("view") else output_file("demo.html", (), "demo:")
+    return scene, result, table, picture, animation
 
 
 def _write_scene(path: Path) -> str | None:
     """Write the scene file; a file that differs is kept, which the returned text states."""
-    from mstmm.runtime.host.files import write_text
+    from mstmm.runtime.platform_support.safe_files import write_text
 
     text = scene_text()
     if path.exists() and path.read_bytes() != text.encode():
@@ -111,26 +119,33 @@ def _simulate(text: str) -> tuple[Result, float]:
     import tomllib
 
     import mstmm
-    from mstmm.runtime.model.results import certified
+    from mstmm.runtime.model.run_results import certify_result
 
     model = mstmm.compile(mstmm.Scene(**tomllib.loads(text)))
     load_method("dop853")
     times = [T_END * i / (SAMPLES - 1) for i in range(SAMPLES)]
-    with bar() as progress:
-        begin = time.perf_counter()
+    with progress_bar() as progress:
+        start_time = time.perf_counter()
         result = model.simulate(T_END, output_times=times, progress=progress)
-        seconds = time.perf_counter() - begin
+        seconds = time.perf_counter() - start_time
         progress.label("estimating the error")
-        result = certified(result, progress)
+        result = certify_result(result, progress)
     return result, seconds
 
 
-def _without_extras() -> list[str]:
+def _missing_extra_lines() -> list[str]:
     lines = []
-    if missing("plot"):
-        lines.append(f"no plot: it needs {', '.join(missing('plot'))}: {install('plot')}")
-    if missing("view"):
-        lines.append(f"no animation: it needs {', '.join(missing('view'))}: {install('view')}")
-    if missing("io"):
-        lines.append(f"CSV, as NetCDF needs {', '.join(missing('io'))}: {install('io')}")
+    if missing_packages("plot"):
+        lines.append(
+            f"no plot: it needs {', '.join(missing_packages('plot'))}: {install_command('plot')}"
+        )
+    if missing_packages("view"):
+        lines.append(
+            f"no animation: it needs {', '.join(missing_packages('view'))}: "
+            f"{install_command('view')}"
+        )
+    if missing_packages("io"):
+        lines.append(
+            f"CSV, as NetCDF needs {', '.join(missing_packages('io'))}: {install_command('io')}"
+        )
     return lines

@@ -4,31 +4,35 @@ from __future__ import annotations
 
 import typer
 
-from .explain import ENVIRONMENT
+from .error_messages import ENVIRONMENT
 from .options import Json
 
 
 def doctor(json: Json = False) -> None:
     """Diagnose compiler, CPU, cache, packages and kernels, with two test runs."""
-    from mstmm.border.fused import FLAGS, TUNING
-    from mstmm.bridge.compilation import compile_scene
-    from mstmm.cli import machine as examination
+    from mstmm.abi.fused_library import COMPILER_FLAGS, OPTIONAL_FLAGS
+    from mstmm.cli import diagnostics as examination
+    from mstmm.pipeline.compilation import compile_scene
 
-    from . import output
+    from . import terminal_output
 
-    findings = examination.examine(compile_scene, FLAGS, TUNING)
+    findings = examination.run_diagnostics(compile_scene, COMPILER_FLAGS, OPTIONAL_FLAGS)
     problems = [finding for finding in findings if not finding.ok]
     if json:
-        plain = [vars(finding) for finding in findings]
-        report = {"ok": not problems, "interpreter": examination.summary(), "findings": plain}
-        output.emit_json(report)
+        rows = [vars(finding) for finding in findings]
+        report = {
+            "ok": not problems,
+            "interpreter": examination.interpreter_text(),
+            "findings": rows,
+        }
+        terminal_output.print_json(report)
     else:
-        output.say(examination.summary())
+        terminal_output.print_lines(examination.interpreter_text())
         width = max(len(finding.subject) for finding in findings)
         for finding in findings:
             mark = "ok     " if finding.ok else "PROBLEM"
-            output.say(f"{mark}  {finding.subject:<{width}}  {finding.text}")
-        output.say(_verdict(len(problems)))
+            terminal_output.print_lines(f"{mark}  {finding.subject:<{width}}  {finding.text}")
+        terminal_output.print_lines(_verdict(len(problems)))
     if problems:
         raise typer.Exit(ENVIRONMENT)
 

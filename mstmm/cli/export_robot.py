@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .import_robot import together
+from .import_robot import grouped_notes
 from .options import Json, new_file
 
 
@@ -21,17 +21,17 @@ def export_robot(
 ) -> None:  # fmt: skip
     """Convert a scene to URDF, and list what could not be converted."""
     import mstmm
-    from mstmm.runtime.host.files import write_text
+    from mstmm.runtime.platform_support.safe_files import write_text
 
-    from .output import emit_json, say
+    from .terminal_output import print_json, print_lines
 
     target = new_file(output, scene, ".urdf")
-    found = mstmm.export_robot(mstmm.load_scene(scene), target.stem)
-    write_text(target, found.text)
+    robot = mstmm.export_robot(mstmm.load_scene(scene), target.stem)
+    write_text(target, robot.text)
     if json:
-        notes = [{"element": n.element, "text": n.text} for n in found.notes]
-        emit_json({"robot": str(target), "notes": notes})
+        notes = [{"element": n.element, "text": n.text} for n in robot.notes]
+        print_json({"robot": str(target), "notes": notes})
         return
-    for line in together(found.notes, "scene"):
-        say(line)
-    say(f"{target}: {found.summary}")
+    for line in grouped_notes(robot.notes, "scene"):
+        print_lines(line)
+    print_lines(f"{target}: {robot.summary}")

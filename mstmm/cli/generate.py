@@ -10,9 +10,9 @@ import typer
 
 from mstmm.errors import EnvironmentFailure, MstmmError
 
-from .options import Json, python_file
+from .options import Json, require_python_file
 
-OUT_OF_DATE = 2
+OUT_OF_DATE_CODE = 2
 
 
 def generate(
@@ -44,9 +44,9 @@ def generate(
     if installed and (files or check):
         raise MstmmError("--installed cannot be combined with files or --check")
     if files or installed:
-        _own([python_file(file) for file in files or []], json)
+        _generate_user_elements([require_python_file(file) for file in files or []], json)
     elif check:
-        _compare(json)
+        _compare_with_committed(json)
     else:
         _regenerate(json)
 
@@ -54,44 +54,46 @@ def generate(
 # --- user elements --------------------------------------------------------------------------------
 
 
-def _own(files: list[str], json: bool) -> None:
+def _generate_user_elements(files: list[str], json: bool) -> None:
     """Generate the elements of files, or without files those of installed packages."""
     import mstmm
-    from mstmm.bridge.compilation import generate_published
+    from mstmm.pipeline.compilation import generate_published
 
-    from .output import emit_json, say
+    from .terminal_output import print_json, print_lines
 
-    made: list[dict[str, Any]] = []
+    generated: list[dict[str, Any]] = []
     for file in files or [""]:
         begin = time.perf_counter()
         elements = mstmm.generate_file(file) if file else generate_published()
         seconds = time.perf_counter() - begin
-        for each in elements:
-            spec = each.spec
-            entry = {"file": file, "kind": spec.kind, "name": spec.name, "how": each.how}
-            made.append({**entry, "folder": str(each.folder), "seconds": seconds})
+        for element in elements:
+            spec = element.spec
+            entry = {"file": file, "kind": spec.kind, "name": spec.name, "how": element.how}
+            generated.append({**entry, "folder": str(element.folder), "seconds": seconds})
             if not json:
-                say(f"{spec.kind} {spec.name}: {each.how}; in {each.folder} ({seconds:.1f} s)")
+                print_lines(
+                    f"{spec.kind} {spec.name}: {element.how}; in {element.folder} ({seconds:.1f} s)"
+                )
     if json:
-        emit_json({"generated": made})
-    elif made:
-        say("Use its name as a type in scenes.")
+        print_json({"generated": generated})
+    elif generated:
+        print_lines("Use its name as a type in scenes.")
     else:
-        say("No installed package provides elements.")
+        print_lines("No installed package provides elements.")
 
 
 # --- elements of the package ----------------------------------------------------------------------
 
 
-def _folder() -> Path:
+def _generated_folder() -> Path:
     import mstmm.generated
 
     return Path(mstmm.generated.__file__ or "").resolve().parent
 
 
-def _checkout() -> Path:
+def _checkout_folder() -> Path:
     """Folder generated/ of the checkout that contains this program."""
-    folder = _folder()
+    folder = _generated_folder()
     if not (folder.parent / "pyproject.toml").is_file():
         raise EnvironmentFailure(
             "mstmm is installed without its checkout, so there is no generated/ to write; run this "
@@ -103,37 +105,39 @@ def _checkout() -> Path:
 def _regenerate(json: bool) -> None:
     from mstmm.derive.catalogue.generate import regenerate
 
-    from .output import emit_json, note, say
+    from .terminal_output import print_json, print_lines, print_note
 
-    folder = _checkout()
-    note("deriving every element; this takes a while")
+    folder = _checkout_folder()
+    print_note("deriving every element; this takes a while")
     written = [path.name for path in regenerate(folder)]
     if json:
-        emit_json({"folder": str(folder), "files": written})
+        print_json({"folder": str(folder), "files": written})
     else:
-        say(f"{len(written)} files in {folder}")
-        say("Compile them: python setup.py -q build_ext --inplace")
+        print_lines(f"{len(written)} files in {folder}")
+        print_lines("Compile them: python setup.py -q build_ext --inplace")
 
 
-def _compare(json: bool) -> None:
+def _compare_with_committed(json: bool) -> None:
     from mstmm.derive.catalogue.generate import differences
 
-    from .output import complain, emit_json, note, say
+    from .terminal_output import print_error, print_json, print_lines, print_note
 
-    folder = _folder()
+    folder = _generated_folder()
     if not json:
-        note("deriving every element; this takes a while")
-    found = differences(folder)
+        print_note("deriving every element; this takes a while")
+    different_files = differences(folder)
     if json:
-        emit_json({"ok": not found, "folder": str(folder), "differences": found})
-    if not found:
+        print_json(
+            {"ok": not different_files, "folder": str(folder), "differences": different_files}
+        )
+    if not different_files:
         if not json:
-            say(f"{folder} is identical to the result of the derivations")
+            print_lines(f"{folder} is identical to the result of the derivations")
         return
     if not json:
-        say("\n".join(found))
-    complain(
-        f"{len(found)} files of {folder} differ from the result of the derivations; "
+        print_lines("\n".join(different_files))
+    print_error(
+        f"{len(different_files)} files of {folder} differ from the result of the derivations; "
         "update them: mstmm generate, and commit generated/"
     )
-    raise typer.Exit(OUT_OF_DATE)
+    raise typer.Exit(OUT_OF_DATE_CODE)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mstmm.arguments import number_in
+from mstmm.argument_validation import parse_number
 from mstmm.errors import EnvironmentFailure, MstmmError, SceneError
 
 if TYPE_CHECKING:
@@ -21,60 +21,60 @@ if TYPE_CHECKING:
 #: Largest number of samples of a run.
 MAX_SAMPLES = 10_000_000
 
-json_text = typer.Option("--json", help="Print JSON instead of text.")
-Json = Annotated[bool, json_text]
+json_option = typer.Option("--json", help="Print JSON instead of text.")
+Json = Annotated[bool, json_option]
 
 
-def quoted(text: Any) -> str:
+def quote(text: Any) -> str:
     """Quote a text of the user in a message, shortened if it is long."""
-    shown = repr(text)
-    return shown if len(shown) <= 60 else shown[:57] + "..."
+    representation = repr(text)
+    return representation if len(representation) <= 60 else representation[:57] + "..."
 
 
-def finite(text: Any) -> float:
+def parse_finite(text: Any) -> float:
     """Parse a finite number."""
     try:
-        value = number_in(text)
+        value = parse_number(text)
     except (TypeError, ValueError):
-        raise typer.BadParameter(f"{quoted(text)} is not a number") from None
+        raise typer.BadParameter(f"{quote(text)} is not a number") from None
     if not math.isfinite(value):
-        raise typer.BadParameter(f"{quoted(text)} is not a finite number")
+        raise typer.BadParameter(f"{quote(text)} is not a finite number")
     return value
 
 
-def positive(text: Any) -> float:
+def parse_positive(text: Any) -> float:
     """Parse a finite number above 0."""
-    value = finite(text)
+    value = parse_finite(text)
     if value <= 0:
-        raise typer.BadParameter(f"{quoted(text)}: expected a number above 0")
+        raise typer.BadParameter(f"{quote(text)}: expected a number above 0")
     return value
 
 
-def not_negative(text: Any) -> float:
+def parse_not_negative(text: Any) -> float:
     """Parse a finite number, 0 or more."""
-    value = finite(text)
+    value = parse_finite(text)
     if value < 0:
-        raise typer.BadParameter(f"{quoted(text)}: expected 0 or more")
+        raise typer.BadParameter(f"{quote(text)}: expected 0 or more")
     return value
 
 
-def at_least(least: int) -> Callable[[Any], int]:
+def integer_parser(least: int) -> Callable[[Any], int]:
     """Parser of integers not below `least`."""
 
-    def whole(text: Any) -> int:
+    def parse_integer(text: Any) -> int:
         try:
             value = int(text)
         except (TypeError, ValueError):
-            raise typer.BadParameter(f"{quoted(text)} is not a whole number") from None
+            raise typer.BadParameter(f"{quote(text)} is not a whole number") from None
         if value < least:
-            raise typer.BadParameter(f"{quoted(text)}: expected a whole number, {least} or more")
+            raise typer.BadParameter(f"{quote(text)}: expected a whole number, {least} or more")
         return value
 
-    return whole
+    return parse_integer
 
 
 @dataclass(frozen=True)
-class Times:
+class OutputTimes:
     """Output times of a run: `count` equidistant ones, or one every `spacing` s."""
 
     count: int | None = None
@@ -90,8 +90,8 @@ class Times:
                 f"--times {self.spacing:g}: expected at most {MAX_SAMPLES} samples, found "
                 f"{t_end / self.spacing:.3g}; use a wider spacing"
             )
-        whole = int(t_end / self.spacing * (1 + 1e-12))
-        times = [self.spacing * i for i in range(whole + 1)]
+        interval_count = int(t_end / self.spacing * (1 + 1e-12))
+        times = [self.spacing * i for i in range(interval_count + 1)]
         if times[-1] >= t_end * (1 - 1e-12):
             times[-1] = t_end
         else:
@@ -99,24 +99,24 @@ class Times:
         return times
 
 
-def times(text: Any) -> Times:
+def parse_times(text: Any) -> OutputTimes:
     """Parse output times: `201` is a number of samples, `0.05`, `2.0` or `2s` a spacing in s."""
-    if isinstance(text, Times):
+    if isinstance(text, OutputTimes):
         return text
     if str(text).isdecimal():
         digits = str(text).lstrip("0")
         if len(digits) > 8 or int(digits or 0) > MAX_SAMPLES:
-            raise typer.BadParameter(f"{quoted(text)}: expected at most {MAX_SAMPLES} samples")
+            raise typer.BadParameter(f"{quote(text)}: expected at most {MAX_SAMPLES} samples")
         if int(digits or 0) < 2:
             raise typer.BadParameter(
-                f"{quoted(text)}: expected 2 samples or more, or a spacing in s such as 0.01 or 1s"
+                f"{quote(text)}: expected 2 samples or more, or a spacing in s such as 0.01 or 1s"
             )
-        return Times(count=int(digits))
+        return OutputTimes(count=int(digits))
     try:
-        return Times(spacing=positive(str(text).removesuffix("s")))
+        return OutputTimes(spacing=parse_positive(str(text).removesuffix("s")))
     except typer.BadParameter:
         raise typer.BadParameter(
-            f"{quoted(text)}: expected a number of samples (201) or a spacing in s (0.05, 1s)"
+            f"{quote(text)}: expected a number of samples (201) or a spacing in s (0.05, 1s)"
         ) from None
 
 
@@ -125,7 +125,7 @@ def with_inputs(scene: Scene, texts: Sequence[str]) -> Scene:
 
     MstmmError for an invalid text, SceneError for an input or signal that the scene does not have.
     """
-    from mstmm.runtime.engine import given as inputs
+    from mstmm.runtime.engine import input_values as inputs
 
     values: dict[str, float | str] = {}
     for text in texts:
@@ -136,17 +136,17 @@ def with_inputs(scene: Scene, texts: Sequence[str]) -> Scene:
             )
         if name in values:
             raise MstmmError(f"--input {text}: {name} is given twice; give it once")
-        values[name] = _number_or_name(value)
+        values[name] = _parse_number_or_name(value)
     try:
-        return inputs.with_inputs(scene, values)
+        return inputs.scene_with_inputs(scene, values)
     except SceneError as error:
         lines = str(error).replace("scene with these inputs: ", "").splitlines()
         raise SceneError("\n".join(f"--input: {line}" for line in lines)) from None
 
 
-def _number_or_name(text: str) -> float | str:
+def _parse_number_or_name(text: str) -> float | str:
     try:
-        return number_in(text)
+        return parse_number(text)
     except ValueError:
         return text
 
@@ -174,7 +174,7 @@ def output_file(text: str, endings: Sequence[str], option: str = "--output") -> 
     EnvironmentFailure if writing is not allowed.
     """
     if not text or "\0" in text:
-        raise MstmmError(f"{option}: expected a file name, found {quoted(text)}")
+        raise MstmmError(f"{option}: expected a file name, found {quote(text)}")
     path = Path(text)
     if endings and path.suffix.lower() not in endings:
         raise MstmmError(f"{option} {text}: expected a name ending in {' or '.join(endings)}")
@@ -207,7 +207,7 @@ def output_folder(text: str, file: str, option: str = "--out") -> Path:
     Raises MstmmError if the name is not a folder, EnvironmentFailure if it is not writable.
     """
     if not text or "\0" in text:
-        raise MstmmError(f"{option}: expected the name of a folder, found {quoted(text)}")
+        raise MstmmError(f"{option}: expected the name of a folder, found {quote(text)}")
     path = Path(text)
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -221,12 +221,12 @@ def output_folder(text: str, file: str, option: str = "--out") -> Path:
     return path
 
 
-def python_file(path: str) -> str:
+def require_python_file(path: str) -> str:
     """Check that a path is an existing Python file; MstmmError for anything else."""
     if not path.endswith(".py"):
-        raise MstmmError(f"{quoted(path)}: expected a Python file (.py) that defines elements")
+        raise MstmmError(f"{quote(path)}: expected a Python file (.py) that defines elements")
     if "\0" in path or not os.path.isfile(path):
-        raise MstmmError(f"{quoted(path)}: there is no such Python file; check the path")
+        raise MstmmError(f"{quote(path)}: there is no such Python file; check the path")
     return path
 
 
@@ -238,9 +238,13 @@ Elements = Annotated[
 ]  # fmt: skip
 Budget = Annotated[
     float,
-    typer.Option("--budget", metavar="SECONDS", parser=positive, help="Wall-clock time limit, s."),
-]  # fmt: skip
+    typer.Option(
+        "--budget", metavar="SECONDS", parser=parse_positive, help="Wall-clock time limit, s."
+    ),
+]
 Rounds = Annotated[
     int,
-    typer.Option("--rounds", metavar="N", parser=at_least(0), help="Number of timing repetitions."),
-]  # fmt: skip
+    typer.Option(
+        "--rounds", metavar="N", parser=integer_parser(0), help="Number of timing repetitions."
+    ),
+]

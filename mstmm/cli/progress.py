@@ -10,11 +10,11 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 #: Seconds before a bar appears, so that short runs show none.
-PATIENCE = 0.7
+DISPLAY_DELAY = 0.7
 
 
-class Bar:
-    """Progress bar of a run, shown after `PATIENCE`; call it with (t, t_end) of the run, s."""
+class ProgressBar:
+    """Progress bar of a run, shown after `DISPLAY_DELAY`; call it with (t, t_end) of the run, s."""
 
     def __init__(self, shown: bool, label: str = "simulating", moves_alone: bool = True) -> None:
         self._shown, self._begin = shown, time.monotonic()
@@ -37,7 +37,9 @@ class Bar:
 
         If the terminal is closed, the bar ends but the work continues.
         """
-        if not self._shown or (self._bar is None and time.monotonic() - self._begin < PATIENCE):
+        if not self._shown or (
+            self._bar is None and time.monotonic() - self._begin < DISPLAY_DELAY
+        ):
             return
         try:
             if self._bar is None:
@@ -68,33 +70,33 @@ class Bar:
 
 
 @contextmanager
-def bar(label: str = "simulating", moves_alone: bool = True) -> Iterator[Bar]:
+def progress_bar(label: str = "simulating", moves_alone: bool = True) -> Iterator[ProgressBar]:
     """Context with a progress bar, which is removed at the end of the block.
 
     Without `moves_alone` the bar is refreshed only by calls and costs no CPU time otherwise.
     """
-    made = Bar(sys.stderr.isatty(), label, moves_alone)
+    progress = ProgressBar(sys.stderr.isatty(), label, moves_alone)
     try:
-        yield made
+        yield progress
     finally:
-        made.stop()
+        progress.stop()
 
 
 @contextmanager
-def waiting(text: str) -> Iterator[None]:
+def elapsed_time_display(text: str) -> Iterator[None]:
     """Context that shows a text and the elapsed time on a terminal, for work of unknown length."""
-    ended = threading.Event()
+    end_event = threading.Event()
 
     def show() -> None:
-        if ended.wait(PATIENCE):
+        if end_event.wait(DISPLAY_DELAY):
             return
         from rich.console import Console
         from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
         columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
-        with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-            shown.add_task(text, total=None)
-            ended.wait()
+        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+            progress.add_task(text, total=None)
+            end_event.wait()
 
     thread = threading.Thread(target=show, daemon=True)
     if sys.stderr.isatty():
@@ -102,6 +104,6 @@ def waiting(text: str) -> Iterator[None]:
     try:
         yield
     finally:
-        ended.set()
+        end_event.set()
         if thread.ident is not None:
             thread.join()

@@ -8,26 +8,26 @@ import typer
 
 from mstmm.errors import ElementError
 
-from .options import Json, output_file, python_file, quoted
+from .options import Json, output_file, quote, require_python_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from mstmm.derive.show.document import ElementView
-    from mstmm.ir.spec import ElementSpec
+    from mstmm.ir.element_spec import ElementSpec
 
 STAGES = ("equations", "matrix", "ir", "c")
 FORMATS = ("text", "latex", "html")
 
 
-def one_of(words: tuple[str, ...]) -> str:
+def choices_text(words: tuple[str, ...]) -> str:
     """Choices in the notation of the help."""
     return "|".join(words)
 
 
-def _choice(text: str, words: tuple[str, ...]) -> str:
+def _require_choice(text: str, words: tuple[str, ...]) -> str:
     if text not in words:
-        raise typer.BadParameter(f"{quoted(text)}: expected one of {', '.join(words)}")
+        raise typer.BadParameter(f"{quote(text)}: expected one of {', '.join(words)}")
     return text
 
 
@@ -43,15 +43,15 @@ def show(
     at: Annotated[
         str,
         typer.Option(
-            "--at", metavar=one_of(STAGES), help="Stage to show.",
-            parser=lambda text: _choice(text, STAGES),
+            "--at", metavar=choices_text(STAGES), help="Stage to show.",
+            parser=lambda text: _require_choice(text, STAGES),
         ),
     ] = "equations",
     format: Annotated[
         str,
         typer.Option(
-            "--format", metavar=one_of(FORMATS), help="Output format.",
-            parser=lambda text: _choice(text, FORMATS),
+            "--format", metavar=choices_text(FORMATS), help="Output format.",
+            parser=lambda text: _require_choice(text, FORMATS),
         ),
     ] = "text",
     output: Annotated[
@@ -70,125 +70,130 @@ def show(
     json: Json = False,
 ) -> None:  # fmt: skip
     """Show the equations, transfer matrix, intermediate representation or C of an element."""
-    from mstmm.runtime.host.files import write_text
+    from mstmm.runtime.platform_support.safe_files import write_text
     from mstmm.scene.load import is_scene_file
 
-    from .output import emit_json, note, put
+    from .terminal_output import print_json, print_note, write_stdout
 
     target = None if output is None else output_file(output, ())
     if beside:
-        pages = {element: _beside(element, format)}
+        pages = {element: _comparison_page(element, format)}
     elif is_scene_file(element):
-        pages = {element: _scene(element, at, format, keep or [])}
+        pages = {element: _scene_page(element, at, format, keep or [])}
     elif keep:
         raise ElementError("--keep applies to scenes: mstmm show SCENE.toml --keep NAME")
     elif element == "sweep":
-        pages = {element: _schedule(at, format)}
+        pages = {element: _schedule_page(at, format)}
     else:
-        pages = {view.name: _page(view, at, format) for view in _views(element, at)}
+        pages = {view.name: _element_page(view, at, format) for view in _element_views(element, at)}
     text = "\n".join(pages.values())
     if target is not None:
         write_text(target, text)
     if json:
         written = None if target is None else str(target)
-        emit_json({"at": at, "format": format, "pages": pages, "file": written})
+        print_json({"at": at, "format": format, "pages": pages, "file": written})
     elif target is None:
-        put(text.rstrip("\n"))
+        write_stdout(text.rstrip("\n"))
     else:
-        note(f"wrote {target}")
+        print_note(f"wrote {target}")
 
 
-def _schedule(at: str, format: str) -> str:
-    from mstmm.derive.show.sweep import sweep_page
+def _schedule_page(at: str, format: str) -> str:
+    from mstmm.derive.show.schedule_page import sweep_page
 
-    from . import stored
+    from . import stored_elements
 
-    return sweep_page(at, format, stored.specs)
-
-
-def _beside(element: str, format: str) -> str:
-    from mstmm.derive.show.beside import beside
-    from mstmm.derive.show.page import printed
-
-    from .names import found
-
-    return printed(*beside("_".join(found(element))), format)
+    return sweep_page(at, format, stored_elements.generated_specs)
 
 
-def _scene(file: str, at: str, format: str, keep: list[str]) -> str:
-    from mstmm.bridge.equations import equations
+def _comparison_page(element: str, format: str) -> str:
+    from mstmm.derive.show.classical_comparison import classical_comparison
+    from mstmm.derive.show.show_page import render_page
+
+    from .element_names import find_element
+
+    return render_page(*classical_comparison("_".join(find_element(element))), format)
+
+
+def _scene_page(file: str, at: str, format: str, keep: list[str]) -> str:
+    from mstmm.pipeline.equations import equations
 
     if at != "equations":
         raise ElementError(
             f"a scene has no stage {at!r}, but its elements have it: mstmm show ELEMENT --at {at}"
         )
-    shown = equations(file, keep)
-    return {"text": shown.text, "latex": shown.latex, "html": shown.html}[format]
+    page = equations(file, keep)
+    return {"text": page.text, "latex": page.latex, "html": page.html}[format]
 
 
-def _page(view: ElementView, at: str, format: str) -> str:
-    from mstmm.derive.show.page import show_view
+def _element_page(view: ElementView, at: str, format: str) -> str:
+    from mstmm.derive.show.show_page import show_view
 
     return show_view(view, at, format)
 
 
-def _views(element: str, at: str) -> list[ElementView]:
+def _element_views(element: str, at: str) -> list[ElementView]:
     """Views of a built-in element, of one in the kernel store, or of all in a file."""
     from mstmm.derive.show import subjects as views
 
-    from . import stored
-    from .names import found
+    from . import stored_elements
+    from .element_names import find_element
 
     if element.endswith(".py"):
-        from mstmm.derive.audit.definition import check
         from mstmm.derive.catalogue.registry import load_file
+        from mstmm.derive.verification.definition_checks import check_element
 
-        defined = load_file(python_file(element))
-        for each in defined:
-            check(each)
-        return [views.of_element(each) for each in defined]
-    kind, name = found(element)
-    full = f"{kind}_{name}"
-    if name not in (entry.name for entry in stored.builtin(kind)):
-        return [_kept(kind, name, at)]
-    kernels, source = stored.text(full, ".json"), stored.text(full, ".c")
+        definitions = load_file(require_python_file(element))
+        for definition in definitions:
+            check_element(definition)
+        return [views.view_of_element(definition) for definition in definitions]
+    kind, name = find_element(element)
+    full_name = f"{kind}_{name}"
+    if name not in (entry.name for entry in stored_elements.builtin_entries(kind)):
+        return [_view_from_store(kind, name, at)]
+    kernels, source = (
+        stored_elements.generated_text(full_name, ".json"),
+        stored_elements.generated_text(full_name, ".c"),
+    )
     if kernels is None or at not in ("ir", "c"):
-        return [views.view(full)]
+        return [views.element_view(full_name)]
     if at == "c" and source is None:
         raise ElementError(
-            f"{full} has no C: runs interpret its intermediate representation; "
-            f"to show that: mstmm show {full} --at ir"
+            f"{full_name} has no C: runs interpret its intermediate representation; "
+            f"to show that: mstmm show {full_name} --at ir"
         )
-    from mstmm.ir.stored import element_from_json
+    from mstmm.ir.json_format import element_from_json
 
-    return [_of_spec(element_from_json(kernels), source or "")]  # without deriving them again
+    return [
+        _view_from_spec(element_from_json(kernels), source or "")
+    ]  # without deriving them again
 
 
-def _defined(file: Path, kind: str, name: str) -> ElementView:
+def _view_from_file(file: Path, kind: str, name: str) -> ElementView:
     """View of an element from the file from which it was generated."""
     from mstmm.derive.catalogue.registry import kind_of, load_file
     from mstmm.derive.show import subjects as views
 
     for element in load_file(file):
         if (kind_of(element), element.name) == (kind, name):
-            return views.of_element(element)
+            return views.view_of_element(element)
     raise ElementError(f"{file}: it does not define {kind} {name!r}; generate it again")
 
 
-def _kept(kind: str, name: str, at: str) -> ElementView:
+def _view_from_store(kind: str, name: str, at: str) -> ElementView:
     """View of an element of the user's kernel store; its equations come from its file."""
-    from mstmm.runtime.kernels import store
+    from mstmm.runtime.kernels import kernel_store
 
-    full = f"{kind}_{name}"
+    full_name = f"{kind}_{name}"
     if at not in ("ir", "c"):
-        return _defined(store.definition((kind, name)), kind, name)
-    path = store.folder() / full / f"{full}.c"
-    return _of_spec(store.specs()[kind, name], path.read_text(encoding="utf-8"))
+        return _view_from_file(kernel_store.definition_path((kind, name)), kind, name)
+    path = kernel_store.folder() / full_name / f"{full_name}.c"
+    return _view_from_spec(kernel_store.all_specs()[kind, name], path.read_text(encoding="utf-8"))
 
 
-def _of_spec(spec: ElementSpec, source: str) -> ElementView:
+def _view_from_spec(spec: ElementSpec, source: str) -> ElementView:
     from mstmm.derive.show.document import ElementView
-    from mstmm.derive.show.entries import of_spec
+    from mstmm.derive.show.entry_names import spec_names
 
     return ElementView(
         f"{spec.kind}_{spec.name}",
@@ -197,6 +202,6 @@ def _of_spec(spec: ElementSpec, source: str) -> ElementView:
         lambda: spec.kernels,
         lambda: source,
         spec.sources,
-        of_spec(spec),
+        spec_names(spec),
         spec.kind in ("hinge", "body", "force"),
     )

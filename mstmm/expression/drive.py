@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable
 
 from ..errors import ExpressionError
 from ..ir import OPERATIONS
+from ..ir.differentiation import derivative
 from ..ir.graph import Graph, Node
-from ..ir.tangent import derivative
 from .expression import Expression, Name
-from .inputs import Inputs, Resolved
+from .inputs import InputNodes, Inputs
 
 #: Most bits of a numerator or denominator: fractions are stored as decimal text.
-_MAX_BITS = 12_000
+_MAX_CONSTANT_BITS = 12_000
 
 
 def motion(
@@ -29,27 +29,27 @@ def motion(
     speed = derivative(position, {time: 1})
     acceleration = derivative(speed, {time: 1})
     for node in (position, speed, acceleration):
-        _refuse_long_constants(node, drive)
+        _check_constants(node, drive)
     return position, speed, acceleration
 
 
-def _refuse_long_constants(root: Node, drive: Expression) -> None:
+def _check_constants(root: Node, drive: Expression) -> None:
     """Reject constants that exact differentiation has made too long or too large.
 
     Derivatives multiply constants exactly, so that hundreds of factors give very long fractions.
     """
-    seen: set[int] = set()
+    visited: set[int] = set()
     stack = [root]
     while stack:
         node = stack.pop()
-        if node.number in seen:
+        if node.number in visited:
             continue
-        seen.add(node.number)
+        visited.add(node.number)
         stack.extend(node.args)
         exact = node.value
         if exact is None:
             continue
-        if max(exact.numerator.bit_length(), exact.denominator.bit_length()) > _MAX_BITS:
+        if max(exact.numerator.bit_length(), exact.denominator.bit_length()) > _MAX_CONSTANT_BITS:
             raise ExpressionError(
                 f"the derivatives of {drive.text[:60]!r} contain a constant of thousands of "
                 "digits; write the product of its constants as one number"
@@ -71,17 +71,17 @@ def motion_at(
     `inputs` are the inputs and signals that the drive may name.  An entry is nan or infinite where
     the expression has no finite value.
     """
-    resolved = Resolved(Graph().element("t"), inputs or {})
+    resolved = InputNodes(Graph().element("t"), inputs or {})
     nodes = motion(drive, resolved.time, resolved.node)
-    q, u, a = (value(node, resolved.leaf(t)) for node in nodes)
+    q, u, a = (node_value(node, resolved.leaf(t)) for node in nodes)
     return q, u, a
 
 
 #: Largest jump of a drive in position or speed that counts as rounding, relative above 1.
-_CONTINUOUS = 1e-6
+_MAX_RELATIVE_JUMP = 1e-6
 
 
-def jump(
+def jump_message(
     drive: Expression, gaps: Iterable[tuple[float, float]], inputs: Inputs | None = None
 ) -> str:
     """Message about the first jump of a drive across gaps (before, after) in time (s), or "".
@@ -89,40 +89,42 @@ def jump(
     A jump in position is not a motion, and a jump in speed needs an impulse: neither has a finite
     effort.
     """
-    resolved = Resolved(Graph().element("t"), inputs or {})
+    resolved = InputNodes(Graph().element("t"), inputs or {})
     nodes = motion(drive, resolved.time, resolved.node)[:2]
     for gap in gaps:
-        for what, node in zip(("position", "speed"), nodes, strict=True):
-            a, b = (value(node, resolved.leaf(t)) for t in gap)
-            if abs(b - a) > _CONTINUOUS * max(1.0, abs(a), abs(b)):
+        for quantity, node in zip(("position", "speed"), nodes, strict=True):
+            a, b = (node_value(node, resolved.leaf(t)) for t in gap)
+            if abs(b - a) > _MAX_RELATIVE_JUMP * max(1.0, abs(a), abs(b)):
                 return (
-                    f"jumps in {what} at t = {gap[0]:g} s, from {a:g} to {b:g}; "
+                    f"jumps in {quantity} at t = {gap[0]:g} s, from {a:g} to {b:g}; "
                     "join the pieces so that position and speed are continuous"
                 )
     return ""
 
 
-def value(node: Node, leaf: Callable[[Node], float]) -> float:
+def node_value(node: Node, leaf: Callable[[Node], float]) -> float:
     """Value of a node in double precision; `leaf` returns the value of each input entry.
 
     nan where the expression has no value; only the selected branch of a `select` counts.
     """
-    known: dict[int, float] = {}
+    values: dict[int, float] = {}
     stack = [node]
     while stack:
         current = stack[-1]
-        if current.number in known:
+        if current.number in values:
             stack.pop()
             continue
-        missing = [a for a in current.args if a.number not in known]
-        if missing:
-            stack.extend(missing)
+        missing_args = [a for a in current.args if a.number not in values]
+        if missing_args:
+            stack.extend(missing_args)
             continue
-        known[current.number] = _one(current, [known[a.number] for a in current.args], leaf)
-    return known[node.number]
+        values[current.number] = _operation_value(
+            current, [values[a.number] for a in current.args], leaf
+        )
+    return values[node.number]
 
 
-def _one(node: Node, args: list[float], leaf: Callable[[Node], float]) -> float:
+def _operation_value(node: Node, args: list[float], leaf: Callable[[Node], float]) -> float:
     if node.op == "pi":
         return math.pi
     if node.op == "element":

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 from ..errors import ExpressionError
 from ..ir.terms import Node, Terms
-from .parser import FUNCTIONS, MAX_LENGTH, MEANING, Name, Parser, Term
+from .parser import FUNCTIONS, MAX_EXPRESSION_LENGTH, OPERATION_FUNCTIONS, Name, Parser, Term
 
 __all__ = ["FUNCTIONS", "SWITCHES", "Expression", "Name", "number", "parse"]
 
@@ -27,8 +27,8 @@ _NEVER_NAN = frozenset({
     "tan", "atan", "atan2", "tanh", "lt", "le", "gt", "ge", "where",
 })  # fmt: skip
 
-_SYMBOLS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
-_Line = tuple[Fraction, Fraction]
+_COMPARISON_SYMBOLS = {"lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+_LinearFunction = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ class Expression:
         if not top.is_condition:
             return None
         left, right = (self._part(i) for i in top.args)
-        return left, _SYMBOLS[top.op], right
+        return left, _COMPARISON_SYMBOLS[top.op], right
 
     def _part(self, root: int) -> Expression:
         term = self.terms[root]
-        needed = self._needed(root)
-        names = _distinct(t.name for i, t in enumerate(self.terms) if i in needed and t.name)
+        required = self._needed(root)
+        names = _distinct(t.name for i, t in enumerate(self.terms) if i in required and t.name)
         # `text` was stripped before parsing, so that positions point into it.
         return Expression(
             self.text[term.start : term.end], names, self.terms, root, constants=self.constants
@@ -98,13 +98,13 @@ class Expression:
         return frozenset(self._needed(self.root))
 
     def _needed(self, root: int) -> set[int]:
-        needed: set[int] = set()
+        required: set[int] = set()
         stack = [root]
         while stack:
             number = stack.pop()
-            needed.add(number)
+            required.add(number)
             stack.extend(self.terms[number].args)
-        return needed
+        return required
 
     # --- meaning --------------------------------------------------------------------------------
 
@@ -119,32 +119,34 @@ class Expression:
     def nodes(self, graph: Terms, resolve: Callable[[Name], Node]) -> dict[int, Node]:
         """Build the nodes of all terms that the value depends on, by term index."""
         nodes: dict[int, Node] = {}
-        numbers: set[int] = set()  # terms that are never nan while names are finite
+        never_nan: set[int] = set()  # terms that are never nan while names are finite
         for number in sorted(self._needed(self.root)):
             term = self.terms[number]
             args = [nodes[i] for i in term.args]
-            total = term.op in _NEVER_NAN and numbers.issuperset(term.args)
-            if total or term.constant is not None:
-                numbers.add(number)
+            is_total = term.op in _NEVER_NAN and never_nan.issuperset(term.args)
+            if is_total or term.constant is not None:
+                never_nan.add(number)
             elif term.op == "where":
-                args[2] = _where_false(graph, self.terms[term.args[0]], nodes, args[2])
+                args[2] = _false_branch(graph, self.terms[term.args[0]], nodes, args[2])
             nodes[number] = _node(graph, term, args, resolve)
         return nodes
 
     def evaluate(self, values: Callable[[Name], float]) -> float:
         """Evaluate in double precision; nan or infinity where there is no finite value."""
-        known: dict[int, float] = {}
-        needed = self._needed(self.root)
+        term_values: dict[int, float] = {}
+        required = self._needed(self.root)
         for number, term in enumerate(self.terms):
-            if number not in needed:
+            if number not in required:
                 continue
             if term.constant is not None:
-                known[number] = term.constant
+                term_values[number] = term.constant
             elif term.name is not None:
-                known[number] = float(values(term.name))
+                term_values[number] = float(values(term.name))
             else:
-                known[number] = float(MEANING[term.op](*(known[i] for i in term.args)))
-        return known[self.root]
+                term_values[number] = float(
+                    OPERATION_FUNCTIONS[term.op](*(term_values[i] for i in term.args))
+                )
+        return term_values[self.root]
 
     def time_breaks(self) -> tuple[float, ...]:
         """Exact switching times (s), ascending.
@@ -159,17 +161,17 @@ class Expression:
 
         None for a term that never switches.
         """
-        lines: list[_Line | None] = []
-        needed = self._needed(self.root)
-        found: dict[int, float | None] = {}
+        linear_functions: list[_LinearFunction | None] = []
+        required = self._needed(self.root)
+        times_by_term: dict[int, float | None] = {}
         for number, term in enumerate(self.terms):
-            args = [lines[i] for i in term.args]
-            lines.append(_line(term, args))
-            known = [line for line in args if line is not None]
-            switches = term.op in SWITCHES and term.constant is None and number in needed
-            if switches and len(known) == len(args):
-                found[number] = _switch(term.op, known)
-        return found
+            args = [linear_functions[i] for i in term.args]
+            linear_functions.append(_linear_function(term, args))
+            linear_args = [linear_arg for linear_arg in args if linear_arg is not None]
+            is_switch = term.op in SWITCHES and term.constant is None and number in required
+            if is_switch and len(linear_args) == len(args):
+                times_by_term[number] = _switching_time(term.op, linear_args)
+        return times_by_term
 
 
 def parse(text: str, where: str = "", constants: Mapping[str, float] | None = None) -> Expression:
@@ -179,17 +181,17 @@ def parse(text: str, where: str = "", constants: Mapping[str, float] | None = No
     ExpressionError with the position marked and a remedy.
     """
     try:
-        return _parse(_checked(text), tuple((constants or {}).items()))
+        return _parse(_require_text(text), tuple((constants or {}).items()))
     except ExpressionError as error:
         raise ExpressionError(f"{where}: {error}" if where else str(error)) from None
 
 
-def _checked(text: object) -> str:
+def _require_text(text: object) -> str:
     if not isinstance(text, str):
         raise ExpressionError(f"expected an expression as text, found {type(text).__name__}")
-    if len(text) > MAX_LENGTH:
+    if len(text) > MAX_EXPRESSION_LENGTH:
         raise ExpressionError(
-            f"the expression has {len(text)} characters, the limit is {MAX_LENGTH}; "
+            f"the expression has {len(text)} characters, the limit is {MAX_EXPRESSION_LENGTH}; "
             "shorten it, or split it into several loads"
         )
     stripped = text.strip(" \t\r\n")
@@ -208,8 +210,8 @@ def _parse(text: str, constants: tuple[tuple[str, float], ...] = ()) -> Expressi
     parser = Parser(text, dict(constants))
     root = parser.run()
     names = _distinct(term.name for term in parser.terms if term.name is not None)
-    used = tuple(parser.used.items())
-    return Expression(text, names, tuple(parser.terms), root, constants=used)
+    used_constants = tuple(parser.used.items())
+    return Expression(text, names, tuple(parser.terms), root, constants=used_constants)
 
 
 def _distinct(names: object) -> tuple[Name, ...]:
@@ -233,7 +235,7 @@ def _node(graph: Terms, term: Term, args: list[Node], resolve: Callable[[Name], 
     return graph.call(term.op, *args)
 
 
-def _where_false(graph: Terms, comparison: Term, nodes: Mapping[int, Node], no: Node) -> Node:
+def _false_branch(graph: Terms, comparison: Term, nodes: Mapping[int, Node], no: Node) -> Node:
     """False branch of a `where`: `no`, or nan if a side of the comparison is nan."""
     a, b = (nodes[i] for i in comparison.args)
     if comparison.op in ("gt", "ge"):
@@ -242,35 +244,41 @@ def _where_false(graph: Terms, comparison: Term, nodes: Mapping[int, Node], no: 
     return graph.select(opposite, no, a + b)
 
 
-def _line(term: Term, args: list[_Line | None]) -> _Line | None:
+def _linear_function(term: Term, args: list[_LinearFunction | None]) -> _LinearFunction | None:
     """Slope and offset of a term that is linear in `t` alone; None for others."""
     if term.constant is not None:
         return Fraction(0), term.exact if term.exact is not None else Fraction(term.constant)
     if term.name is not None:
         is_time = term.name.parts == ("t",) and term.name.index is None
         return (Fraction(1), Fraction(0)) if is_time else None
-    lines = [line for line in args if line is not None]
-    if len(lines) < len(args) or any(_is_long(line) for line in lines):
+    linear_args = [line for line in args if line is not None]
+    if len(linear_args) < len(args) or any(_is_long(line) for line in linear_args):
         return None
     if term.op == "neg":
-        return -lines[0][0], -lines[0][1]
+        return -linear_args[0][0], -linear_args[0][1]
     if term.op in ("add", "sub"):
         sign = 1 if term.op == "add" else -1
-        return lines[0][0] + sign * lines[1][0], lines[0][1] + sign * lines[1][1]
+        return linear_args[0][0] + sign * linear_args[1][0], linear_args[0][1] + sign * linear_args[
+            1
+        ][1]
     if term.op == "mul":
-        one, other = lines if lines[0][0] == 0 else reversed(lines)
-        return (one[1] * other[0], one[1] * other[1]) if one[0] == 0 else None
-    if term.op == "div" and lines[1][0] == 0 and lines[1][1] != 0:
-        return lines[0][0] / lines[1][1], lines[0][1] / lines[1][1]
+        constant_line, other_line = linear_args if linear_args[0][0] == 0 else reversed(linear_args)
+        return (
+            (constant_line[1] * other_line[0], constant_line[1] * other_line[1])
+            if constant_line[0] == 0
+            else None
+        )
+    if term.op == "div" and linear_args[1][0] == 0 and linear_args[1][1] != 0:
+        return linear_args[0][0] / linear_args[1][1], linear_args[0][1] / linear_args[1][1]
     return None
 
 
-def _is_long(line: _Line) -> bool:
+def _is_long(line: _LinearFunction) -> bool:
     """Whether a coefficient is too long for an exact switching time."""
     return any(max(abs(x.numerator), x.denominator).bit_length() > 8000 for x in line)
 
 
-def _switch(op: str, lines: list[_Line]) -> float | None:
+def _switching_time(op: str, lines: list[_LinearFunction]) -> float | None:
     """Time (s) at which an operation on linear functions of time changes branch."""
     if op in ("sign", "abs"):
         slope, offset = lines[0]

@@ -29,11 +29,11 @@ from typing import Any
 from ..errors import ExpressionError
 from ..ir import OPERATIONS
 
-MAX_LENGTH = 4000
+MAX_EXPRESSION_LENGTH = 4000
 MAX_DEPTH = 100
-MAX_WORD = 64
+MAX_NAME_LENGTH = 64
 #: Most bits of an exact constant; longer ones are rounded to double precision.
-_MAX_BITS = 2100
+_MAX_EXACT_BITS = 2100
 
 #: Function name -> number of arguments (None: two or more).
 FUNCTIONS: dict[str, int | None] = {
@@ -55,7 +55,7 @@ _TOKEN = re.compile(
     r"(?:\.[A-Za-z_][A-Za-z0-9_]*)*(?:\[[0-9]{1,6}\])?)"
     r"|(?P<symbol><=|>=|[-+*/^<>(),])"
 )
-_WAYS_OUT = {
+_REMEDIES = {
     "**": "write ^ for a power",
     "=": "a comparison is one of < <= > >=",
     "!": "a comparison is one of < <= > >=",
@@ -72,16 +72,16 @@ _WAYS_OUT = {
 }
 
 #: Longest expression that messages show whole; of longer ones they show the part with the error.
-_SHOWN = 80
+_MAX_SHOWN_LENGTH = 80
 
 
-def marked(text: str, position: int) -> str:
+def mark_position(text: str, position: int) -> str:
     """Position in an expression as text: character number, and the text around it with an arrow."""
-    before, after = text[max(0, position - 30) : position], text[position:]
-    before = ("..." if position > 30 else "") + before
-    after = after[:30] + ("..." if len(after) > 30 else "")
-    shown = f"{before} -->{after}".encode("unicode_escape").decode("ascii")
-    return f"character {position + 1}: {shown.strip()}"
+    text_before, text_after = text[max(0, position - 30) : position], text[position:]
+    text_before = ("..." if position > 30 else "") + text_before
+    text_after = text_after[:30] + ("..." if len(text_after) > 30 else "")
+    marked_text = f"{text_before} -->{text_after}".encode("unicode_escape").decode("ascii")
+    return f"character {position + 1}: {marked_text.strip()}"
 
 
 @dataclass(frozen=True)
@@ -121,11 +121,15 @@ class Name:
         return self.parts[-1]
 
 
-def around(text: str, name: Name) -> str:
+def context_of_name(text: str, name: Name) -> str:
     """Expression that contains a name, for the end of a message; shortened where it is long."""
     if text == name.text:
         return ""
-    return f" (in {text!r})" if len(text) <= _SHOWN else f" ({marked(text, name.position)})"
+    return (
+        f" (in {text!r})"
+        if len(text) <= _MAX_SHOWN_LENGTH
+        else f" ({mark_position(text, name.position)})"
+    )
 
 
 @dataclass(frozen=True)
@@ -149,28 +153,28 @@ class Term:
         return self.op in ("lt", "le", "gt", "ge")
 
 
-def _compare(holds: Callable[[Any, Any], bool]) -> Callable[[Any, Any], float]:
+def _comparison_function(holds: Callable[[Any, Any], bool]) -> Callable[[Any, Any], float]:
     """Comparison as a number: 1 or 0, or nan where either argument is nan."""
     return lambda a, b: float(holds(a, b)) if a == a and b == b else math.nan
 
 
 #: Functions of all operations in double precision, with the same values as in C.
-MEANING: dict[str, Callable[..., Any]] = {
+OPERATION_FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: row.value for name, row in OPERATIONS.items()},
-    **{name: _compare(getattr(operator, name)) for name in ("lt", "le", "gt", "ge")},
+    **{name: _comparison_function(getattr(operator, name)) for name in ("lt", "le", "gt", "ge")},
     "where": lambda condition, a, b: (
         (a if condition else b) if condition == condition else condition
     ),
 }
 
 #: Operations with an exact value on fractions.
-_EXACT = frozenset({
+_EXACT_OPERATIONS = frozenset({
     "neg", "add", "sub", "mul", "div", "abs", "min", "max", "lt", "le", "gt", "ge", "where", "sign",
 })  # fmt: skip
 
 
 @dataclass
-class _Pending:
+class _PendingOperator:
     """Operator or open parenthesis on the stack; `op` of a parenthesis is "(" or a function."""
 
     op: str
@@ -192,12 +196,12 @@ class Parser:
         self._constants = {} if constants is None else constants
         self.terms: list[Term] = []
         self._operands: list[tuple[int, int, int]] = []  # term, start and end with parentheses
-        self._waiting: list[_Pending] = []
+        self._waiting: list[_PendingOperator] = []
         self._depth = 0
 
     def error(self, message: str, position: int) -> ExpressionError:
         """ExpressionError with its position marked by an arrow in the text."""
-        return ExpressionError(f"{message} ({marked(self.text, position)})")
+        return ExpressionError(f"{message} ({mark_position(self.text, position)})")
 
     # --- the loop over tokens ---------------------------------------------------------------
 
@@ -221,14 +225,14 @@ class Parser:
             raise self.error("the expression ends where a value is expected", len(self.text))
         self._reduce_to_group()
         if self._waiting:
-            opened = self._waiting[-1].position
-            raise self.error("this parenthesis is not closed; add )", opened)
+            open_position = self._waiting[-1].position
+            raise self.error("this parenthesis is not closed; add )", open_position)
         return self._operands[-1][0]
 
     def _unknown_character(self, position: int) -> ExpressionError:
         character = self.text[position]
-        way_out = _WAYS_OUT.get(character, "see the grammar: numbers, names, + - * / ^, functions")
-        return self.error(f"{character!a} is not part of an expression; {way_out}", position)
+        remedy = _REMEDIES.get(character, "see the grammar: numbers, names, + - * / ^, functions")
+        return self.error(f"{character!a} is not part of an expression; {remedy}", position)
 
     def _operand(self, kind: str, token: str, start: int, end: int) -> tuple[bool, int]:
         """Read an operand: (whether a value is still expected, position of the next token)."""
@@ -240,24 +244,26 @@ class Parser:
         if token == "(":
             self._open("(", start)
         elif token == "-":
-            self._waiting.append(_Pending("neg", _PREFIX_PRECEDENCE, start))
+            self._waiting.append(_PendingOperator("neg", _PREFIX_PRECEDENCE, start))
         elif token == ")" and self._waiting and self._waiting[-1].is_group:
             raise self.error("a value is missing before )", start)
         elif token == "*" and self.text[max(0, start - 1) : start] == "*":
-            raise self.error(_WAYS_OUT["**"], start - 1)
+            raise self.error(_REMEDIES["**"], start - 1)
         elif token != "+":
             raise self.error(f"a value is expected before {token}", start)
         return True, end
 
     def _word(self, token: str, start: int, end: int) -> tuple[bool, int]:
-        follows = end
-        while follows < len(self.text) and self.text[follows] in " \t\r\n":
-            follows += 1
-        if follows < len(self.text) and self.text[follows] == "(":
+        next_position = end
+        while next_position < len(self.text) and self.text[next_position] in " \t\r\n":
+            next_position += 1
+        if next_position < len(self.text) and self.text[next_position] == "(":
             if token not in FUNCTIONS:
-                raise self.error(f"unknown function {token[:MAX_WORD]!r}; {_near(token)}", start)
+                raise self.error(
+                    f"unknown function {token[:MAX_NAME_LENGTH]!r}; {_did_you_mean(token)}", start
+                )
             self._open(token, start)
-            return True, follows + 1
+            return True, next_position + 1
         if token == "pi":
             self._push(Term("pi", (), start, end, constant=math.pi), start, end)
             return False, end
@@ -269,7 +275,7 @@ class Parser:
             return False, end
         if token in self._constants:
             value = self.used[token] = float(self._constants[token])
-            exact = _limited(Fraction(repr(value)), value)
+            exact = _limit_digits(Fraction(repr(value)), value)
             self._push(Term("number", (), start, end, exact, value), start, end)
             return False, end
         if token in FUNCTIONS:
@@ -278,14 +284,14 @@ class Parser:
         return False, end
 
     def _name(self, token: str, start: int) -> Name:
-        words, bracket, index = token, "", ""
+        name_text, bracket, index = token, "", ""
         if token.endswith("]"):
-            words, bracket, index = token.rpartition("[")
-        parts = tuple(words.split("."))
+            name_text, bracket, index = token.rpartition("[")
+        parts = tuple(name_text.split("."))
         if len(parts) > 4:
             raise self.error("a name has at most four parts, as in body.end.velocity.x", start)
-        if any(len(part.partition("[")[0]) > MAX_WORD for part in parts):
-            raise self.error(f"each part of a name has at most {MAX_WORD} characters", start)
+        if any(len(part.partition("[")[0]) > MAX_NAME_LENGTH for part in parts):
+            raise self.error(f"each part of a name has at most {MAX_NAME_LENGTH} characters", start)
         return Name(parts, int(index[:-1]) if bracket else None, start)
 
     def _operator(self, kind: str, token: str, start: int) -> bool:
@@ -306,7 +312,7 @@ class Parser:
             if top < precedence or (top == precedence and token == "^"):
                 break
             self._reduce()
-        self._waiting.append(_Pending(op, precedence, start))
+        self._waiting.append(_PendingOperator(op, precedence, start))
         return True
 
     # --- groups and functions ---------------------------------------------------------------
@@ -315,7 +321,7 @@ class Parser:
         self._depth += 1
         if self._depth > MAX_DEPTH:
             raise self.error(f"more than {MAX_DEPTH} nested parentheses", start)
-        self._waiting.append(_Pending(op, 0, start, is_group=True))
+        self._waiting.append(_PendingOperator(op, 0, start, is_group=True))
 
     def _reduce_to_group(self) -> None:
         while self._waiting and not self._waiting[-1].is_group:
@@ -340,15 +346,19 @@ class Parser:
             term, _, _ = self._operands.pop()
             self._operands.append((term, group.position, start + 1))
             return
-        count, wanted = group.arguments + 1, FUNCTIONS[group.op]
-        if count != wanted and not (wanted is None and count >= 2):
-            takes = "two or more arguments" if wanted is None else _count(wanted)
-            raise self.error(f"{group.op}: expected {takes}, found {count}", group.position)
+        count, expected_count = group.arguments + 1, FUNCTIONS[group.op]
+        if count != expected_count and not (expected_count is None and count >= 2):
+            expected_text = (
+                "two or more arguments"
+                if expected_count is None
+                else _argument_count_text(expected_count)
+            )
+            raise self.error(f"{group.op}: expected {expected_text}, found {count}", group.position)
         arguments = self._operands[-count:]
         del self._operands[-count:]
         # min(a, b, c) is min(min(a, b), c)
         groups = [arguments]
-        if wanted is None:
+        if expected_count is None:
             groups = [arguments[:2], *([a] for a in arguments[2:])]
         for members in groups:
             numbers = [m[0] for m in members]
@@ -371,7 +381,7 @@ class Parser:
             if re.search("[1-9]", re.split("[eE]", token)[0]):
                 raise self.error("this number is too small; the limit is about 4.9e-324", start)
             return Term("number", (), start, end, Fraction(0), 0.0)
-        return Term("number", (), start, end, _limited(Fraction(token), value), value)
+        return Term("number", (), start, end, _limit_digits(Fraction(token), value), value)
 
     def _reduce(self) -> None:
         pending = self._waiting.pop()
@@ -405,9 +415,9 @@ class Parser:
         values = [t.constant for t in terms if t.constant is not None]
         if len(values) < len(terms):
             return None, None
-        value = float(MEANING[op](*values))
+        value = float(OPERATION_FUNCTIONS[op](*values))
         if not math.isfinite(value):
-            raise self.error(f"this {_WORDS.get(op, op)} has no finite real value", mark)
+            raise self.error(f"this {_OPERATION_NAMES.get(op, op)} has no finite real value", mark)
         exact = [t.exact for t in terms if t.exact is not None]
         if len(exact) < len(terms):
             return None, value
@@ -415,26 +425,36 @@ class Parser:
             base, exponent = exact
             if exponent.denominator != 1 or abs(exponent) > 16:
                 return None, value
-            return _limited(base ** int(exponent), value), value
-        found = _limited(Fraction(MEANING[op](*exact)), value) if op in _EXACT else None
-        return found, value
+            return _limit_digits(base ** int(exponent), value), value
+        exact_value = (
+            _limit_digits(Fraction(OPERATION_FUNCTIONS[op](*exact)), value)
+            if op in _EXACT_OPERATIONS
+            else None
+        )
+        return exact_value, value
 
 
-_WORDS = {"pow": "power", "add": "sum", "sub": "difference", "mul": "product", "div": "quotient"}
+_OPERATION_NAMES = {
+    "pow": "power",
+    "add": "sum",
+    "sub": "difference",
+    "mul": "product",
+    "div": "quotient",
+}
 
 
-def _limited(exact: Fraction, value: float) -> Fraction:
+def _limit_digits(exact: Fraction, value: float) -> Fraction:
     """Exact number, or the nearest double where its fraction is too long."""
     bits = max(exact.numerator.bit_length(), exact.denominator.bit_length())
-    return exact if bits <= _MAX_BITS else Fraction(value)
+    return exact if bits <= _MAX_EXACT_BITS else Fraction(value)
 
 
-def _count(number: int) -> str:
+def _argument_count_text(number: int) -> str:
     return "one argument" if number == 1 else f"{number} arguments"
 
 
-def _near(name: str) -> str:
-    close = difflib.get_close_matches(name[:MAX_WORD].lower(), FUNCTIONS, n=1, cutoff=0.5)
-    if close:
-        return f"did you mean {close[0]}?"
+def _did_you_mean(name: str) -> str:
+    matches = difflib.get_close_matches(name[:MAX_NAME_LENGTH].lower(), FUNCTIONS, n=1, cutoff=0.5)
+    if matches:
+        return f"did you mean {matches[0]}?"
     return "the functions are " + ", ".join(FUNCTIONS)

@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from .kernel import KernelIR
+from .statement_writer import GuardRequest, StoreRequest, Writer
 from .statements import Port, Solve
 from .terms import Node, Number, Terms
-from .writer import GuardRequest, StoreRequest, Writer
 
 __all__ = ["Graph", "Node", "Number"]
 

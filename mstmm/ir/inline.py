@@ -13,15 +13,15 @@ from fractions import Fraction
 from itertools import product
 
 from .graph import Graph, Node
+from .interpreter import LoopingInterpreter
 from .kernel import KernelIR
-from .replay import Counted
 from .statements import Constant, Guard, Port, Solve
-from .unrolled import solve_by_rows, solve_symmetric
+from .unrolled_solve import solve_pivoted, solve_symmetric
 
 Nodes = list[Node]
-Guarding = Callable[[Node, int], None]
+GuardHandler = Callable[[Node, int], None]
 #: Receives a condition, and the guard or the solve that requires it.
-Judge = Callable[[Node, Guard | Solve], None]
+ConditionHandler = Callable[[Node, Guard | Solve], None]
 
 
 class Inliner:
@@ -35,7 +35,7 @@ class Inliner:
         self,
         kernel: KernelIR,
         inputs: Mapping[str, Sequence[Node]],
-        guard: Guarding | None = None,
+        guard: GuardHandler | None = None,
         n: int = 0,
     ) -> dict[str, Nodes]:
         """Outputs by port, flat and row-major; accumulating outputs give their increment.
@@ -45,29 +45,29 @@ class Inliner:
         it such guards are dropped.
         """
 
-        def judge(condition: Node, judged: Guard | Solve) -> None:
+        def handle_condition(condition: Node, judged: Guard | Solve) -> None:
             if guard is not None and not (condition.value or 0):
                 guard(condition, judged.code)
 
-        return _Replay(self.graph, kernel, inputs, judge, n).run()
+        return _GraphInterpreter(self.graph, kernel, inputs, handle_condition, n).run()
 
     def constant(self, operand: Constant) -> Node:
         """The node of a constant."""
         return self.graph.number(operand)
 
 
-def unrolled(kernel: KernelIR, n: int) -> KernelIR:
+def unroll(kernel: KernelIR, n: int) -> KernelIR:
     """Specialise a kernel for one run-time size: no loops, solves by elimination."""
-    return instance(kernel, elements, lambda _, found: found, n)
+    return specialise(kernel, element_nodes, lambda _, found: found, n)
 
 
-def elements(graph: Graph, port: Port) -> Nodes:
+def element_nodes(graph: Graph, port: Port) -> Nodes:
     """Nodes of the entries of an array, row-major."""
-    places = product(*(range(int(extent)) for extent in port.shape))
-    return [graph.element(port.name, *place) for place in places]
+    indices = product(*(range(int(extent)) for extent in port.shape))
+    return [graph.element(port.name, *place) for place in indices]
 
 
-def instance(
+def specialise(
     kernel: KernelIR,
     given: Callable[[Graph, Port], Nodes],
     kept: Callable[[Port, Nodes], Sequence[Node] | None],
@@ -83,32 +83,34 @@ def instance(
     a store moves before it.
     """
 
-    def fixed(port: Port) -> Port:
+    def with_fixed_size(port: Port) -> Port:
         return replace(port, shape=tuple(n if isinstance(e, str) else e for e in port.shape))
 
     graph = Graph()
-    taken, outputs = ([*map(fixed, ports)] for ports in (kernel.inputs, kernel.outputs))
-    numbers = {port.name: given(graph, port) for port in taken}
+    input_ports, output_ports = (
+        [*map(with_fixed_size, ports)] for ports in (kernel.inputs, kernel.outputs)
+    )
+    input_values = {port.name: given(graph, port) for port in input_ports}
 
-    def judge(condition: Node, judged: Guard | Solve) -> None:
+    def add_guard(condition: Node, judged: Guard | Solve) -> None:
         graph.guard(condition, judged.code, judged.message)
 
-    found = _Replay(graph, kernel, numbers, judge, n).run()
-    written = {laid(port): kept(port, found[port.name]) for port in outputs}
-    values = {
-        port.name: _nested(port.shape, row) for port, row in written.items() if row is not None
-    }
+    results = _GraphInterpreter(graph, kernel, input_values, add_guard, n).run()
+    written = {laid(port): kept(port, results[port.name]) for port in output_ports}
+    values = {port.name: _nest(port.shape, row) for port, row in written.items() if row is not None}
     inputs = [
-        laid(port) for port in taken
-        if not numbers[port.name] or any(node.value is None for node in numbers[port.name])
-    ]  # fmt: skip
-    wanted = [port for port in written if port.name in values]
+        laid(port)
+        for port in input_ports
+        if not input_values[port.name]
+        or any(node.value is None for node in input_values[port.name])
+    ]
+    written_ports = [port for port in written if port.name in values]
     return graph.kernel(
-        kernel.name, inputs, wanted, values, purpose=kernel.purpose, sources=kernel.sources
+        kernel.name, inputs, written_ports, values, purpose=kernel.purpose, sources=kernel.sources
     )
 
 
-class _Replay(Counted):
+class _GraphInterpreter(LoopingInterpreter):
     """Interpretation of one kernel on the nodes of a graph."""
 
     def __init__(
@@ -116,7 +118,7 @@ class _Replay(Counted):
         graph: Graph,
         kernel: KernelIR,
         inputs: Mapping[str, Sequence[Node]],
-        judge: Judge,
+        judge: ConditionHandler,
         n: int,
     ) -> None:
         super().__init__(kernel, graph.operations, n, inputs, graph.constant(0))
@@ -134,7 +136,7 @@ class _Replay(Counted):
         width = len(b) // n if n else 0
         right = [list(b[width * i : width * (i + 1)]) for i in range(n)]
         if solve.symmetric:
-            found = solve_symmetric(
+            solution = solve_symmetric(
                 self.graph,
                 [[a[n * j + i] for j in range(n)] for i in range(n)],
                 right,
@@ -142,15 +144,15 @@ class _Replay(Counted):
                 Fraction(str(solve.relative_pivot)),
             )
         else:
-            found = solve_by_rows(
+            solution = solve_pivoted(
                 self.graph, [list(a[n * i : n * (i + 1)]) for i in range(n)], right
             )
-        self.results[solve.port][:] = [node for row in found for node in row]
+        self.results[solve.port][:] = [node for row in solution for node in row]
 
 
-def _nested(shape: tuple[int | str, ...], row: Sequence[Node]) -> object:
+def _nest(shape: tuple[int | str, ...], row: Sequence[Node]) -> object:
     """Nest the numbers of a port (row-major) in lists of its shape."""
     if not shape:
         return row[0]
     step = len(row) // int(shape[0]) if shape[0] else 0
-    return [_nested(shape[1:], row[step * i : step * (i + 1)]) for i in range(int(shape[0]))]
+    return [_nest(shape[1:], row[step * i : step * (i + 1)]) for i in range(int(shape[0]))]

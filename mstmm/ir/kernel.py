@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from .check import Check
 from .statements import (
     LOOP_INDEX,
     Assign,
@@ -24,6 +23,7 @@ from .statements import (
     Sum,
     Temporary,
 )
+from .validation import Check
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def _assignments(statements: Iterable[Statement]) -> Iterator[Assign]:
             yield from _assignments(statement.body)
 
 
-def elements(kernel: KernelIR) -> list[Element]:
+def read_elements(kernel: KernelIR) -> list[Element]:
     """Entries of inputs and complete outputs that statements read."""
     operands = [operand for statement in assignments(kernel) for operand in statement.args]
     operands += [s.value for s in kernel.statements if isinstance(s, (Store, Sum))]
@@ -79,9 +79,9 @@ def elements(kernel: KernelIR) -> list[Element]:
     return [x for x in operands if isinstance(x, Element)]
 
 
-def reads(kernel: KernelIR, port: str) -> bool:
+def reads_port(kernel: KernelIR, port: str) -> bool:
     """Whether any statement reads the port."""
-    return any(x.port == port for x in elements(kernel))
+    return any(x.port == port for x in read_elements(kernel))
 
 
 def check(kernel: KernelIR) -> None:

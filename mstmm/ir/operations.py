@@ -2,8 +2,8 @@
 
 C, the tape, numpy, SymPy, the listing, folding, differentiation, expressions and the passes over
 fused code read this table.  A new operation needs a row here, a function in each of the C texts
-`fused_real.c` and `fused_lanes.c`, and an entry in `derive.audit.arithmetic` if mpmath computes it
-in another way.
+`fused_scalar_type.c` and `fused_lanes.c`, and an entry in `derive.audit.arithmetic` if mpmath
+computes it in another way.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from . import doubles
+from . import c_arithmetic
 
 #: Applies an operation by its name.
 Call = Callable[..., Any]
@@ -52,16 +52,16 @@ class Operation:
     at_zero: int | None = None
 
     def __post_init__(self) -> None:
-        usual = f"{self.name}({', '.join(f'{{{k}}}' for k in range(self.arity))})"
-        object.__setattr__(self, "c", self.c or usual)
+        default_text = f"{self.name}({', '.join(f'{{{k}}}' for k in range(self.arity))})"
+        object.__setattr__(self, "c", self.c or default_text)
         object.__setattr__(self, "text", self.text or self.c)
         object.__setattr__(self, "numpy", self.numpy or self.name)
 
     @cached_property
     def sign(self) -> str:
         """Operator of C between the two operands; "" if it is not a binary operator."""
-        found = re.fullmatch(r"\{t?0\} (\S+) \{t?1\}", self.c)
-        return found[1] if found else ""
+        match = re.fullmatch(r"\{t?0\} (\S+) \{t?1\}", self.c)
+        return match[1] if match else ""
 
     @cached_property
     def of_the_library(self) -> bool:
@@ -69,12 +69,12 @@ class Operation:
         return self.c == f"{self.name}({{0}})"
 
 
-def true(value: Any) -> bool:
+def is_true(value: Any) -> bool:
     """Whether a number is neither zero nor NaN."""
     return bool(abs(value) > 0)
 
 
-def _truth(condition: Callable[..., bool]) -> Callable[..., Any]:
+def _truth_function(condition: Callable[..., bool]) -> Callable[..., Any]:
     """Wrap a condition so that it returns 1 or 0 in the type of the operands."""
     return lambda *a: type(a[0])(condition(*a))
 
@@ -85,8 +85,8 @@ def _power_slope(call: Call, y: Any, a: Sequence[Any], d: Sequence[Any]) -> Any:
     if d[1].value == 0:
         return slope
     # For a constant exponent a negative base has a derivative but no logarithm.
-    still = call("eq", d[1], 0)
-    return call("select", still, slope, slope + y * call("log", base) * d[1])
+    is_exponent_constant = call("eq", d[1], 0)
+    return call("select", is_exponent_constant, slope, slope + y * call("log", base) * d[1])
 
 
 def _arc_slope(call: Call, y: Any, a: Sequence[Any], d: Sequence[Any]) -> Any:
@@ -96,67 +96,240 @@ def _arc_slope(call: Call, y: Any, a: Sequence[Any], d: Sequence[Any]) -> Any:
 
 _ROWS = (
     Operation("neg", 1, 1, operator.neg, lambda call, y, a, d: -d[0], c="-{0}", numpy="negative"),
-    Operation("add", 2, 4, operator.add, lambda call, y, a, d: d[0] + d[1], c="{0} + {1}",
-              commutative=True),
-    Operation("sub", 2, 4, operator.sub, lambda call, y, a, d: d[0] - d[1], c="{0} - {1}",
-              numpy="subtract"),
-    Operation("mul", 2, 4, operator.mul, lambda call, y, a, d: d[0] * a[1] + a[0] * d[1],
-              c="{0} * {1}", numpy="multiply", commutative=True),
-    Operation("div", 2, 13, doubles.divide, lambda call, y, a, d: (d[0] - y * d[1]) / a[1],
-              c="{0} / {1}", numpy="divide"),
-    Operation("pow", 2, 20, doubles.power, _power_slope, text="{0} ** {1}"),
-    Operation("sqrt", 1, 20, doubles.guarded(math.sqrt), lambda call, y, a, d: d[0] / (2 * y),
-              at_zero=0),
-    Operation("sin", 1, 30, doubles.guarded(math.sin),
-              lambda call, y, a, d: call("cos", a[0]) * d[0], sympy="sin", at_zero=0),
-    Operation("cos", 1, 30, doubles.guarded(math.cos),
-              lambda call, y, a, d: -(call("sin", a[0]) * d[0]), sympy="cos", at_zero=1),
-    Operation("tan", 1, 20, doubles.guarded(math.tan), lambda call, y, a, d: (1 + y * y) * d[0],
-              sympy="tan", at_zero=0),
-    Operation("asin", 1, 20, doubles.guarded(math.asin), _arc_slope, sympy="asin", at_zero=0),
-    Operation("acos", 1, 20, doubles.guarded(math.acos), lambda *given: -_arc_slope(*given),
-              sympy="acos"),
-    Operation("atan", 1, 20, math.atan, lambda call, y, a, d: d[0] / (1 + a[0] * a[0]),
-              sympy="atan", at_zero=0),
-    Operation("atan2", 2, 20, math.atan2,
-              lambda call, y, a, d: (d[0] * a[1] - a[0] * d[1]) / (a[1] * a[1] + a[0] * a[0]),
-              sympy="atan2"),
-    Operation("sinh", 1, 20, doubles.guarded(math.sinh, lambda a: math.copysign(math.inf, a)),
-              lambda call, y, a, d: call("cosh", a[0]) * d[0], sympy="sinh", at_zero=0),
-    Operation("cosh", 1, 20, doubles.guarded(math.cosh),
-              lambda call, y, a, d: call("sinh", a[0]) * d[0], sympy="cosh", at_zero=1),
-    Operation("tanh", 1, 20, math.tanh, lambda call, y, a, d: (1 - y * y) * d[0], sympy="tanh",
-              at_zero=0),
-    Operation("exp", 1, 20, doubles.guarded(math.exp), lambda call, y, a, d: y * d[0], sympy="exp",
-              at_zero=1),
-    Operation("log", 1, 20, doubles.log, lambda call, y, a, d: d[0] / a[0], sympy="log"),
-    Operation("abs", 1, 1, abs, lambda call, y, a, d: call("sign", a[0]) * d[0], c="fabs({0})",
-              text="abs({0})", sympy="Abs"),
-    Operation("sign", 1, 3, lambda a: type(a)((a > 0) - (a < 0)) if true(a) else a,
-              c="{0} > 0 ? 1 : ({0} < 0 ? -1 : {0})", text="sign({0})", sympy="sign"),
-    Operation("floor", 1, 8, doubles.floor, sympy="floor"),
-    Operation("min", 2, 3, lambda a, b: a if a < b or a != a else b,
-              lambda call, y, a, d: call("select", call("lt", *a), d[0], d[1]),
-              c="({0} < {1} || isnan({0})) ? {0} : {1}", text="min({0}, {1})", numpy="minimum",
-              commutative=True),
-    Operation("max", 2, 3, lambda a, b: b if a < b or b != b else a,
-              lambda call, y, a, d: call("select", call("lt", *a), d[1], d[0]),
-              c="({0} < {1} || isnan({1})) ? {1} : {0}", text="max({0}, {1})", numpy="maximum",
-              commutative=True),
-    Operation("lt", 2, 1, _truth(operator.lt), c="{0} < {1}", numpy="less", truth=True),
-    Operation("le", 2, 1, _truth(operator.le), c="{0} <= {1}", numpy="less_equal", truth=True),
-    Operation("eq", 2, 1, _truth(operator.eq), c="{0} == {1}", numpy="equal", truth=True,
-              commutative=True),
-    Operation("and", 2, 1, _truth(lambda a, b: true(a) and true(b)), c="{t0} && {t1}",
-              text="{0} and {1}", numpy="logical_and", truth=True, conditions=2, commutative=True),
-    Operation("or", 2, 1, _truth(lambda a, b: true(a) or true(b)), c="{t0} || {t1}",
-              text="{0} or {1}", numpy="logical_or", truth=True, conditions=2, commutative=True),
-    Operation("not", 1, 1, _truth(lambda a: a == 0), c="{0} == 0", text="not {0}",
-              numpy="logical_not", truth=True),
-    Operation("select", 3, 2, lambda c, a, b: a if true(c) else b,
-              lambda call, y, a, d: call("select", a[0], d[1], d[2]), c="{t0} ? {1} : {2}",
-              text="{1} if {0} else {2}", numpy="where", conditions=1),
-)  # fmt: skip
+    Operation(
+        "add",
+        2,
+        4,
+        operator.add,
+        lambda call, y, a, d: d[0] + d[1],
+        c="{0} + {1}",
+        commutative=True,
+    ),
+    Operation(
+        "sub",
+        2,
+        4,
+        operator.sub,
+        lambda call, y, a, d: d[0] - d[1],
+        c="{0} - {1}",
+        numpy="subtract",
+    ),
+    Operation(
+        "mul",
+        2,
+        4,
+        operator.mul,
+        lambda call, y, a, d: d[0] * a[1] + a[0] * d[1],
+        c="{0} * {1}",
+        numpy="multiply",
+        commutative=True,
+    ),
+    Operation(
+        "div",
+        2,
+        13,
+        c_arithmetic.divide,
+        lambda call, y, a, d: (d[0] - y * d[1]) / a[1],
+        c="{0} / {1}",
+        numpy="divide",
+    ),
+    Operation("pow", 2, 20, c_arithmetic.power, _power_slope, text="{0} ** {1}"),
+    Operation(
+        "sqrt",
+        1,
+        20,
+        c_arithmetic.with_c_limits(math.sqrt),
+        lambda call, y, a, d: d[0] / (2 * y),
+        at_zero=0,
+    ),
+    Operation(
+        "sin",
+        1,
+        30,
+        c_arithmetic.with_c_limits(math.sin),
+        lambda call, y, a, d: call("cos", a[0]) * d[0],
+        sympy="sin",
+        at_zero=0,
+    ),
+    Operation(
+        "cos",
+        1,
+        30,
+        c_arithmetic.with_c_limits(math.cos),
+        lambda call, y, a, d: -(call("sin", a[0]) * d[0]),
+        sympy="cos",
+        at_zero=1,
+    ),
+    Operation(
+        "tan",
+        1,
+        20,
+        c_arithmetic.with_c_limits(math.tan),
+        lambda call, y, a, d: (1 + y * y) * d[0],
+        sympy="tan",
+        at_zero=0,
+    ),
+    Operation(
+        "asin", 1, 20, c_arithmetic.with_c_limits(math.asin), _arc_slope, sympy="asin", at_zero=0
+    ),
+    Operation(
+        "acos",
+        1,
+        20,
+        c_arithmetic.with_c_limits(math.acos),
+        lambda *given: -_arc_slope(*given),
+        sympy="acos",
+    ),
+    Operation(
+        "atan",
+        1,
+        20,
+        math.atan,
+        lambda call, y, a, d: d[0] / (1 + a[0] * a[0]),
+        sympy="atan",
+        at_zero=0,
+    ),
+    Operation(
+        "atan2",
+        2,
+        20,
+        math.atan2,
+        lambda call, y, a, d: (d[0] * a[1] - a[0] * d[1]) / (a[1] * a[1] + a[0] * a[0]),
+        sympy="atan2",
+    ),
+    Operation(
+        "sinh",
+        1,
+        20,
+        c_arithmetic.with_c_limits(math.sinh, lambda a: math.copysign(math.inf, a)),
+        lambda call, y, a, d: call("cosh", a[0]) * d[0],
+        sympy="sinh",
+        at_zero=0,
+    ),
+    Operation(
+        "cosh",
+        1,
+        20,
+        c_arithmetic.with_c_limits(math.cosh),
+        lambda call, y, a, d: call("sinh", a[0]) * d[0],
+        sympy="cosh",
+        at_zero=1,
+    ),
+    Operation(
+        "tanh", 1, 20, math.tanh, lambda call, y, a, d: (1 - y * y) * d[0], sympy="tanh", at_zero=0
+    ),
+    Operation(
+        "exp",
+        1,
+        20,
+        c_arithmetic.with_c_limits(math.exp),
+        lambda call, y, a, d: y * d[0],
+        sympy="exp",
+        at_zero=1,
+    ),
+    Operation("log", 1, 20, c_arithmetic.log, lambda call, y, a, d: d[0] / a[0], sympy="log"),
+    Operation(
+        "abs",
+        1,
+        1,
+        abs,
+        lambda call, y, a, d: call("sign", a[0]) * d[0],
+        c="fabs({0})",
+        text="abs({0})",
+        sympy="Abs",
+    ),
+    Operation(
+        "sign",
+        1,
+        3,
+        lambda a: type(a)((a > 0) - (a < 0)) if is_true(a) else a,
+        c="{0} > 0 ? 1 : ({0} < 0 ? -1 : {0})",
+        text="sign({0})",
+        sympy="sign",
+    ),
+    Operation("floor", 1, 8, c_arithmetic.floor, sympy="floor"),
+    Operation(
+        "min",
+        2,
+        3,
+        lambda a, b: a if a < b or a != a else b,
+        lambda call, y, a, d: call("select", call("lt", *a), d[0], d[1]),
+        c="({0} < {1} || isnan({0})) ? {0} : {1}",
+        text="min({0}, {1})",
+        numpy="minimum",
+        commutative=True,
+    ),
+    Operation(
+        "max",
+        2,
+        3,
+        lambda a, b: b if a < b or b != b else a,
+        lambda call, y, a, d: call("select", call("lt", *a), d[1], d[0]),
+        c="({0} < {1} || isnan({1})) ? {1} : {0}",
+        text="max({0}, {1})",
+        numpy="maximum",
+        commutative=True,
+    ),
+    Operation("lt", 2, 1, _truth_function(operator.lt), c="{0} < {1}", numpy="less", truth=True),
+    Operation(
+        "le", 2, 1, _truth_function(operator.le), c="{0} <= {1}", numpy="less_equal", truth=True
+    ),
+    Operation(
+        "eq",
+        2,
+        1,
+        _truth_function(operator.eq),
+        c="{0} == {1}",
+        numpy="equal",
+        truth=True,
+        commutative=True,
+    ),
+    Operation(
+        "and",
+        2,
+        1,
+        _truth_function(lambda a, b: is_true(a) and is_true(b)),
+        c="{t0} && {t1}",
+        text="{0} and {1}",
+        numpy="logical_and",
+        truth=True,
+        conditions=2,
+        commutative=True,
+    ),
+    Operation(
+        "or",
+        2,
+        1,
+        _truth_function(lambda a, b: is_true(a) or is_true(b)),
+        c="{t0} || {t1}",
+        text="{0} or {1}",
+        numpy="logical_or",
+        truth=True,
+        conditions=2,
+        commutative=True,
+    ),
+    Operation(
+        "not",
+        1,
+        1,
+        _truth_function(lambda a: a == 0),
+        c="{0} == 0",
+        text="not {0}",
+        numpy="logical_not",
+        truth=True,
+    ),
+    Operation(
+        "select",
+        3,
+        2,
+        lambda c, a, b: a if is_true(c) else b,
+        lambda call, y, a, d: call("select", a[0], d[1], d[2]),
+        c="{t0} ? {1} : {2}",
+        text="{1} if {0} else {2}",
+        numpy="where",
+        conditions=1,
+    ),
+)
 
 #: Operation name -> row.  The order is that of the tape's instructions.
 OPERATIONS: dict[str, Operation] = {row.name: row for row in _ROWS}

@@ -37,13 +37,13 @@ class Port:
 
     def offset(self, index: tuple[int | str, ...], n: int = 0, k: int = 0, inner: int = 0) -> int:
         """Row-major index of an entry, for `LOOP_INDEX` = `k` and `INNER_INDEX` = `inner`."""
-        place = 0
+        offset = 0
         for entry, extent in zip(index, self.shape, strict=True):
             width = n if isinstance(extent, str) else extent
             if isinstance(entry, str):
                 entry = k if entry == LOOP_INDEX else inner
-            place = place * width + entry
-        return place
+            offset = offset * width + entry
+        return offset
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ class Guard:
 
 #: Code that C returns after a complete kernel if an unsymmetric matrix, not known to be positive
 #: definite, has a negative determinant; all results are valid.
-NEGATIVE = 2
+NEGATIVE_DETERMINANT = 2
 
 
 @dataclass(frozen=True)

@@ -59,7 +59,7 @@ def compile_tape(kernel: KernelIR) -> Tape:
     layout = _Layout(kernel)
     instructions: list[int] = []
     outputs: list[int] = []
-    places = {port.name: place for place, port in enumerate(kernel.outputs)}
+    output_indices = {port.name: output_index for output_index, port in enumerate(kernel.outputs)}
     for statement in kernel.statements:
         if isinstance(statement, Assign):
             slots = [layout.slot(operand) for operand in statement.args]
@@ -69,10 +69,10 @@ def compile_tape(kernel: KernelIR) -> Tape:
             instructions += [GUARD_OPCODE, statement.code]
             instructions += [layout.slot(statement.condition)] * 3
         elif isinstance(statement, Store):
-            place = places[statement.port]
-            port = kernel.outputs[place]
+            output_index = output_indices[statement.port]
+            port = kernel.outputs[output_index]
             slot = layout.slot(statement.value)
-            outputs += [place, port.offset(statement.index), slot, int(port.accumulate)]
+            outputs += [output_index, port.offset(statement.index), slot, int(port.accumulate)]
         else:
             raise ValueError(f"{kernel.name}: a tape has no loops and no solve")
     return Tape(

@@ -19,7 +19,7 @@ LOOP_BITS = {LOOP_INDEX: 1, INNER_INDEX: 2}
 _ZERO, _ONE, _MINUS_ONE, _POSITIVE, _NEGATIVE = 1, 2, 3, 4, 5
 
 
-def _kind(value: Fraction) -> int:
+def _constant_kind(value: Fraction) -> int:
     if value.denominator == 1 and -1 <= value.numerator <= 1:
         return (_ZERO, _ONE, _MINUS_ONE)[value.numerator]
     return _POSITIVE if value.numerator > 0 else _NEGATIVE
@@ -45,7 +45,7 @@ class Node:
         self.loops = loops
         #: Exact value of a rational constant, else None.
         self.value: Fraction | None = leaf if isinstance(leaf, Fraction) else None
-        self.kind = 0 if self.value is None else _kind(self.value)
+        self.kind = 0 if self.value is None else _constant_kind(self.value)
 
     def __add__(self, other: Node | Number) -> Node:
         return self.graph.add(self, self.graph.node(other))
@@ -94,12 +94,12 @@ class Terms:
         self, op: str, args: tuple[Node, ...] = (), leaf: Fraction | Element | str | None = None
     ) -> Node:
         key = (op, leaf, *(a.number for a in args))
-        found = self._nodes.get(key)
-        if found is None:
-            found = Node(self, self._count, op, args, leaf, _loops(op, args, leaf))
+        node = self._nodes.get(key)
+        if node is None:
+            node = Node(self, self._count, op, args, leaf, _loop_bits(op, args, leaf))
             self._count += 1
-            self._nodes[key] = found
-        return found
+            self._nodes[key] = node
+        return node
 
     def constant(self, value: Number) -> Node:
         """Node of an exact rational number (a float becomes the equal fraction)."""
@@ -107,19 +107,19 @@ class Terms:
             return self._make("constant", leaf=value)
         if type(value) is not int:
             return self._make("constant", leaf=Fraction(value))
-        found = self._whole.get(value)
-        if found is None:
-            found = self._whole[value] = self._make("constant", leaf=Fraction(value))
-        return found
+        node = self._whole.get(value)
+        if node is None:
+            node = self._whole[value] = self._make("constant", leaf=Fraction(value))
+        return node
 
     def number(self, constant: Constant) -> Node:
         """Node of a constant of a kernel."""
-        found = self._numbers.get(constant.text)
-        if found is None:
+        node = self._numbers.get(constant.text)
+        if node is None:
             text = constant.text
-            found = self.pi if text == "pi" else self.constant(Fraction(text))
-            self._numbers[text] = found
-        return found
+            node = self.pi if text == "pi" else self.constant(Fraction(text))
+            self._numbers[text] = node
+        return node
 
     @property
     def pi(self) -> Node:
@@ -189,9 +189,9 @@ class Terms:
 
     def mul(self, a: Node, b: Node) -> Node:
         if a.kind or b.kind:
-            folded = self._scaled(a, b) if a.kind else self._scaled(b, a)
-            if folded is not None:
-                return folded
+            product = self._scaled(a, b) if a.kind else self._scaled(b, a)
+            if product is not None:
+                return product
         if a.op == "neg":
             return self.neg(self.mul(a.args[0], b))
         if b.op == "neg":
@@ -270,8 +270,8 @@ class Terms:
     @cached_property
     def operations(self) -> Mapping[str, Callable[..., Node]]:
         """Operation name -> function of nodes."""
-        every = {name: partial(self.call, name) for name in OPERATIONS}
-        return every | {name: partial(method, self) for name, method in _ARITHMETIC.items()}
+        table = {name: partial(self.call, name) for name in OPERATIONS}
+        return table | {name: partial(method, self) for name, method in _ARITHMETIC.items()}
 
     def sin(self, a: Node) -> Node:
         return self.call("sin", a)
@@ -301,17 +301,19 @@ class Terms:
         """Node of the same value with the two loop variables exchanged."""
         if not node.loops:
             return node
-        found = self._swapped.get(node.number)
-        if found is None:
+        swapped = self._swapped.get(node.number)
+        if swapped is None:
             if isinstance(node.leaf, Element):
-                index = [_other(e) if isinstance(e, str) else e for e in node.leaf.index]
-                found = self.element(node.leaf.port, *index)
+                index = [_swap_letter(e) if isinstance(e, str) else e for e in node.leaf.index]
+                swapped = self.element(node.leaf.port, *index)
             elif node.op == "sum":
-                found = self._make("sum", (self._swap(node.args[0]),), _other(str(node.leaf)))
+                swapped = self._make(
+                    "sum", (self._swap(node.args[0]),), _swap_letter(str(node.leaf))
+                )
             else:
-                found = self.call(node.op, *(self._swap(a) for a in node.args))
-            self._swapped[node.number] = found
-        return found
+                swapped = self.call(node.op, *(self._swap(a) for a in node.args))
+            self._swapped[node.number] = swapped
+        return swapped
 
 
 #: Operations whose folding is a method of Terms.
@@ -321,19 +323,19 @@ _ARITHMETIC: dict[str, Callable[..., Node]] = {
 }  # fmt: skip
 
 
-def _loops(op: str, args: tuple[Node, ...], leaf: Fraction | Element | str | None) -> int:
+def _loop_bits(op: str, args: tuple[Node, ...], leaf: Fraction | Element | str | None) -> int:
     """Loop variables that a node depends on, as bits."""
     if isinstance(leaf, Element):
-        found = 0
+        bits = 0
         for entry in leaf.index:
             if isinstance(entry, str):
-                found |= LOOP_BITS[entry]
-        return found
-    found = 0
+                bits |= LOOP_BITS[entry]
+        return bits
+    bits = 0
     for a in args:
-        found |= a.loops
-    return found & ~LOOP_BITS[str(leaf)] if op == "sum" else found
+        bits |= a.loops
+    return bits & ~LOOP_BITS[str(leaf)] if op == "sum" else bits
 
 
-def _other(letter: str) -> str:
+def _swap_letter(letter: str) -> str:
     return INNER_INDEX if letter == LOOP_INDEX else LOOP_INDEX

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from .files.read import read
+from .files.read import read_tables
 from .load import load_scene
-from .rules.values import split
 from .scene import Scene
 from .tables.beam import Beam
 from .tables.beam_keys import Modes, Section, Shapes
@@ -14,18 +13,51 @@ from .tables.chain import Chain
 from .tables.closures import Constraint, Coupling
 from .tables.elastic import Elastic
 from .tables.elastic_keys import Arrays, Box, ElasticEnd
-from .tables.flexible import Damping, Start
+from .tables.external.external_names import Names
+from .tables.external.geometry import Shape
+from .tables.external.inputs import Input, Output, Signal
+from .tables.flexible_keys import Damping, InitialDeformation
 from .tables.hinge import Hinge
-from .tables.hinge_keys import Initial, Rated
+from .tables.hinge_keys import HingeRating, Initial
 from .tables.law import Friction, Law, LawEntry, Limits, SpringLaw
 from .tables.loads import Event, Load, Spring
-from .tables.outside.inputs import Input, Output, Signal
-from .tables.outside.names import Names
-from .tables.outside.shape import Shape
+from .validators.scalars_and_vectors import split_reference
 
 __all__ = [
-    "Arrays", "Beam", "Body", "Box", "Bushing", "Chain", "Constraint", "Coupling", "Damping",
-    "Elastic", "ElasticEnd", "End", "Event", "Friction", "Hinge", "Initial", "Input", "Law",
-    "LawEntry", "Limits", "Load", "Modes", "Names", "Output", "Rated", "Scene", "Section",
-    "Shape", "Shapes", "Signal", "Spring", "SpringLaw", "Start", "load_scene", "read", "split",
+    "Arrays",
+    "Beam",
+    "Body",
+    "Box",
+    "Bushing",
+    "Chain",
+    "Constraint",
+    "Coupling",
+    "Damping",
+    "Elastic",
+    "ElasticEnd",
+    "End",
+    "Event",
+    "Friction",
+    "Hinge",
+    "HingeRating",
+    "Initial",
+    "InitialDeformation",
+    "Input",
+    "Law",
+    "LawEntry",
+    "Limits",
+    "Load",
+    "Modes",
+    "Names",
+    "Output",
+    "Scene",
+    "Section",
+    "Shape",
+    "Shapes",
+    "Signal",
+    "Spring",
+    "SpringLaw",
+    "load_scene",
+    "read_tables",
+    "split_reference",
 ]  # fmt: skip

@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import SceneError
-from ..ir.spec import ElementSpec
-from .files.read import MAX_SIZE, read
-from .robots.files import import_robot, is_robot
+from ..ir.element_spec import ElementSpec
+from .files.read import MAX_FILE_SIZE_MB, read_tables
+from .robots.formats import import_robot, is_robot
 from .scene import Scene
-from .tables.elastic_keys import FOLDER
+from .tables.elastic_keys import SCENE_FOLDER
 
 
 def is_scene_file(name: str) -> bool:
     """Whether a file name has a suffix that `load_scene` reads."""
-    return os.path.splitext(name)[1].lower() in MAX_SIZE or is_robot(name)
+    return os.path.splitext(name)[1].lower() in MAX_FILE_SIZE_MB or is_robot(name)
 
 
 def load_scene(
@@ -41,17 +41,17 @@ def load_scene(
     """
     if isinstance(path, str | os.PathLike) and is_robot(path):
         return import_robot(path, units=units).scene
-    where, data = read(path)
+    where, data = read_tables(path)
     if units is not None:
         raise SceneError(
             f"{where}: units: expected none for a scene file, found {units!r:.60}; leave it out, "
             "scene files are in m and kg, only robot files have other units"
         )
-    token = FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
+    token = SCENE_FOLDER.set(str(Path(os.fsdecode(os.fspath(path))).absolute().parent))
     try:
         scene = Scene.from_data(data, where)
     finally:
-        FOLDER.reset(token)
+        SCENE_FOLDER.reset(token)
     if known_types is not None:
         scene.check_types(known_types, where)
     return scene

@@ -13,27 +13,27 @@ from typing import Any
 
 from pydantic import ConfigDict, ValidationError, model_validator
 
-from ..arguments import short
+from ..argument_validation import abbreviate
 from ..errors import SceneError
-from ..ir.spec import ElementSpec
-from ..markup import Displayed
-from ..markup import table as html_table
+from ..ir.element_spec import ElementSpec
+from ..notebook_html import NotebookDisplay
+from ..notebook_html import table as html_table
 from ..risk import Risk, sentences
-from .checks import couplings, flexible, types
-from .checks import scene as checks
+from .checks import consistency as checks
+from .checks import couplings, flexible_bodies, user_types
 from .files.write import to_toml
-from .rules import written
-from .rules.messages import TABLES, report, scene_error
-from .rules.values import Refused
-from .tables.all import SceneTables
 from .tables.beam_keys import ROOT
-from .tables.constants import evaluated
+from .tables.constants import evaluate_constants
+from .tables.scene_tables import SceneTables
+from .validators import constant_expressions
+from .validators.scalars_and_vectors import ValidationProblems
+from .validators.validation_messages import TABLES, build_scene_error, scene_error
 
 #: Name of the scene that is being validated, for messages.
 _source: ContextVar[str] = ContextVar("source", default="scene")
 
 
-class Scene(SceneTables, Displayed):
+class Scene(SceneTables, NotebookDisplay):
     """Validated description of a multibody system in SI units and radians; frozen.
 
     `gravity` is in m/s^2, inertial axes; `constants` are named numbers.  Lists keep the order of
@@ -46,12 +46,14 @@ class Scene(SceneTables, Displayed):
     def __init__(self, /, **data: Any) -> None:
         """Validate the tables of a scene; raise SceneError with up to ten problems, one a line."""
         try:
-            constants = evaluated(data.get("constants", {}))
-        except Refused as refused:
-            found = [(("constants", *place), message) for place, message in refused.problems]
-            raise report(found, data, _source.get()) from None
+            constants = evaluate_constants(data.get("constants", {}))
+        except ValidationProblems as refused:
+            problems = [
+                (("constants", *location), message) for location, message in refused.problems
+            ]
+            raise build_scene_error(problems, data, _source.get()) from None
         try:
-            with written.known(constants, _names(data)):
+            with constant_expressions.constants_context(constants, _input_and_signal_names(data)):
                 super().__init__(**data)
         except ValidationError as error:
             raise scene_error(error, type(self), data, _source.get()) from None
@@ -60,7 +62,7 @@ class Scene(SceneTables, Displayed):
     def from_data(cls, data: Mapping[str, Any], where: str = "scene") -> Scene:
         """Create a scene from the keys of a file; `where` begins every message."""
         if not isinstance(data, Mapping) or not all(isinstance(key, str) for key in data):
-            raise SceneError(f"{where}: expected a table of scene keys, found {short(data)}")
+            raise SceneError(f"{where}: expected a table of scene keys, found {abbreviate(data)}")
         token = _source.set(where)
         try:
             return cls(**data)
@@ -71,18 +73,21 @@ class Scene(SceneTables, Displayed):
     def summary(self) -> str:
         """Number of elements of each kind: 3 bodies, 3 hinges, 1 spring."""
         counts = {"body": len(self.bodies), "hinge": len(self.hinges)}
-        counts |= {name: len(getattr(self, name)) for name in _COUNTED}
-        return ", ".join(_count(n, word) for word, n in counts.items() if n)
+        counts |= {name: len(getattr(self, name)) for name in _SUMMARY_TABLES}
+        return ", ".join(_count_text(n, table) for table, n in counts.items() if n)
 
     def __repr__(self) -> str:
         return f"<Scene: {self.summary}>"
 
     def _repr_html_(self) -> str:
-        hinges = [(one.name, one.type, one.inboard, one.outboard) for one in self.hinges[:_LISTED]]
+        hinges = [
+            (hinge.name, hinge.type, hinge.inboard, hinge.outboard)
+            for hinge in self.hinges[:_MAX_LISTED_HINGES]
+        ]
         head = ("hinge", "type", "inboard", "outboard")
-        more = len(self.hinges) - len(hinges)
-        behind = f"<p>and {more} more</p>" if more else ""
-        return f"<p>{self.summary}</p>{html_table(hinges, head)}{behind}"
+        more_count = len(self.hinges) - len(hinges)
+        more_html = f"<p>and {more_count} more</p>" if more_count else ""
+        return f"<p>{self.summary}</p>{html_table(hinges, head)}{more_html}"
 
     @property
     def risks(self) -> tuple[Risk, ...]:
@@ -103,9 +108,9 @@ class Scene(SceneTables, Displayed):
 
         Raises SceneError; `where` begins every message.
         """
-        problems = types.problems_with(self, spec)
+        problems = user_types.problems_of_type(self, spec)
         if problems:
-            raise report(problems, self._tables(), where)
+            raise build_scene_error(problems, self._tables(), where)
 
     def check_types(
         self, known_types: Mapping[tuple[str, str], ElementSpec], where: str = "scene"
@@ -116,46 +121,58 @@ class Scene(SceneTables, Displayed):
         of user-defined types then have the facts of their type.  Raises SceneError.
         """
         if not isinstance(known_types, Mapping):
-            raise SceneError(f"known_types: expected a table, found {short(known_types)}")
-        problems = types.problems(self, known_types)
+            raise SceneError(f"known_types: expected a table, found {abbreviate(known_types)}")
+        problems = user_types.type_problems(self, known_types)
         if not problems:
-            with written.known(self.constants, self.channels):
-                problems = types.learn(self, known_types)
-                problems = problems or [*couplings.problems(self), *flexible.spins(self)]
+            with constant_expressions.constants_context(self.constants, self.channels):
+                problems = user_types.apply_definitions(self, known_types)
+                problems = problems or [
+                    *couplings.problems(self),
+                    *flexible_bodies.spin_problems(self),
+                ]
         if problems:
-            raise report(problems, self._tables(), where)
+            raise build_scene_error(problems, self._tables(), where)
 
     def _tables(self) -> dict[str, Any]:
         return {table: getattr(self, table) for table in TABLES}
 
     @model_validator(mode="after")
     def _settle(self) -> Scene:
-        for table in _UNNAMED:
-            object.__setattr__(self, table, _named(table, getattr(self, table)))
-        for table, elements in _at_roots(self).items():
+        for table in _AUTO_NAMED_TABLES:
+            object.__setattr__(self, table, _name_elements(table, getattr(self, table)))
+        for table, elements in _tables_with_beam_roots(self).items():
             object.__setattr__(self, table, elements)
         problems = checks.problems(self)
         if problems:
-            raise Refused(*problems)
+            raise ValidationProblems(*problems)
         return self
 
 
 #: Tables that a summary counts besides bodies and hinges; hinges that a notebook lists.
-_COUNTED = ("beam", "elastic", "load", "spring", "bushing", "constraint", "coupling", "event")
-_LISTED = 20
-_MANY = {"body": "bodies", "elastic": "elastic bodies", "bushing": "bushings"}
+_SUMMARY_TABLES = (
+    "beam",
+    "elastic",
+    "load",
+    "spring",
+    "bushing",
+    "constraint",
+    "coupling",
+    "event",
+)
+_MAX_LISTED_HINGES = 20
+_PLURALS = {"body": "bodies", "elastic": "elastic bodies", "bushing": "bushings"}
 
 
-def _count(n: int, word: str) -> str:
-    one = "elastic body" if word == "elastic" else word
-    return f"{n} {one if n == 1 else _MANY.get(word, word + 's')}"
+def _count_text(n: int, word: str) -> str:
+    singular = "elastic body" if word == "elastic" else word
+    return f"{n} {singular if n == 1 else _PLURALS.get(word, word + 's')}"
 
 
 #: Tables whose elements need no name; they are numbered.
-_UNNAMED = ("load", "event", "spring", "bushing", "constraint", "coupling", "shape")
+_AUTO_NAMED_TABLES = ("load", "event", "spring", "bushing", "constraint", "coupling", "shape")
 
 
-def _names(data: Mapping[str, Any]) -> Iterator[str]:
+def _input_and_signal_names(data: Mapping[str, Any]) -> Iterator[str]:
     """Names of inputs and signals in unvalidated data."""
     for table in ("input", "signal"):
         elements = data.get(table, ())
@@ -166,37 +183,37 @@ def _names(data: Mapping[str, Any]) -> Iterator[str]:
                 yield name
 
 
-def _named(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
+def _name_elements(table: str, elements: tuple[Any, ...]) -> tuple[Any, ...]:
     """Name elements without a name "load1" and so on, avoiding existing names."""
-    taken = {element.name for element in elements}
-    named = []
+    used_names = {element.name for element in elements}
+    named_elements = []
     for i, element in enumerate(elements, 1):
         if not element.name:
             name = f"{table}{i}"
-            while name in taken:
+            while name in used_names:
                 name += "_"
-            taken.add(name)
+            used_names.add(name)
             element = element.model_copy(update={"name": name})
-        named.append(element)
-    return tuple(named)
+        named_elements.append(element)
+    return tuple(named_elements)
 
 
 #: Keys that refer to a body or one of its ends.
-_REFERENCES = {
+_REFERENCE_KEYS = {
     "hinge": ("inboard", "outboard"), "chain": ("inboard",), "load": ("on",),
     "spring": ("from_", "to"), "bushing": ("from_", "to"), "constraint": ("from_", "to"),
     "shape": ("on",),
 }  # fmt: skip
 
 
-def _at_roots(scene: SceneTables) -> dict[str, tuple[Any, ...]]:
+def _tables_with_beam_roots(scene: SceneTables) -> dict[str, tuple[Any, ...]]:
     """Tables in which the name of a beam is replaced by its root, "blade.root".
 
     Loads per length keep the name of the beam.
     """
     beams = {beam.name for beam in scene.beam}
-    changed: dict[str, tuple[Any, ...]] = {}
-    for table, keys in _REFERENCES.items() if beams else ():
+    changed_tables: dict[str, tuple[Any, ...]] = {}
+    for table, keys in _REFERENCE_KEYS.items() if beams else ():
         elements = []
         for element in getattr(scene, table):
             update = {
@@ -206,5 +223,5 @@ def _at_roots(scene: SceneTables) -> dict[str, tuple[Any, ...]]:
                 and getattr(element, "force_per_length", None) is None
             }
             elements.append(element.model_copy(update=update) if update else element)
-        changed[table] = tuple(elements)
-    return changed
+        changed_tables[table] = tuple(elements)
+    return changed_tables

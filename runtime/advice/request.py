@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mstmm.arrays import real, whole
+from mstmm.array_validation import finite_float, integer
 from mstmm.errors import SceneError
 
 
@@ -27,7 +27,7 @@ def request(
 ) -> Request:
     """SceneError naming the first argument that makes no sense."""
     wanted = _names(of)
-    asked = real("error", error, "an error above 0")
+    asked = finite_float("error", error, "an error above 0")
     in_parts = len(wanted) != 1  # a quantity alone has a unit, in which 5 may be little
     if not asked > 0 or not math.isfinite(asked) or (in_parts and asked >= 1):
         limits = "above 0 and below 1" if in_parts else "above 0, in the unit of the quantity"
@@ -35,8 +35,8 @@ def request(
     return Request(
         _above_zero("t_end", t_end), asked, wanted,
         _above_zero("budget", budget),
-        whole("samples", samples, 2, "a whole number of samples, 2 or more"),
-        whole("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
+        integer("samples", samples, 2, "a whole number of samples, 2 or more"),
+        integer("rounds", rounds, 0, "a whole number of rounds, 0 or more"),
     )  # fmt: skip
 
 
@@ -49,7 +49,7 @@ def _names(of: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def _above_zero(name: str, value: float) -> float:
-    found = real(name, value, "a time in s above 0")
+    found = finite_float(name, value, "a time in s above 0")
     if not found > 0 or not math.isfinite(found):
         raise SceneError(f"{name} = {found:g}: expected a time in s above 0")
     return found

@@ -11,9 +11,9 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from .choice import LINEAR, ONE_WAY, RIGID, STIFFENED, VIBRATION, Bodies, Choice
-from .evidence import Evidence
-from .trials import Bench, Tried
+from .body_model_levels import LINEAR, ONE_WAY, RIGID, STIFFENED, VIBRATION, Bodies, BodyModel
+from .error_predictors import ErrorPrediction
+from .trial_models import TrialResult, TrialRunner
 
 #: A choice is expected to suffice below this part of what is asked, and is not tried where more
 #: than so many times of it is expected; a one-way response, which takes its time, than so many.
@@ -22,11 +22,11 @@ _ENOUGH, _HOPELESS, _DOUBTFUL = 0.5, 50.0, 3.0
 #: Bodies get richer together where this part of the largest error is expected of them.
 _TOGETHER = 0.1
 
-Choices = dict[str, Choice]
+Choices = dict[str, BodyModel]
 
 
 @dataclass
-class Search:
+class ModelSearch:
     """The search over one scene.
 
     `enough` is the error that suffices, `in_measure` turns metres into the unit of errors;
@@ -34,33 +34,33 @@ class Search:
     """
 
     bodies: Bodies
-    bench: Bench
-    evidence: Mapping[str, Evidence]
+    bench: TrialRunner
+    evidence: Mapping[str, ErrorPrediction]
     enough: float
     in_measure: float
     time_left: Callable[[], bool]
-    failed: set[tuple[str, Choice]] = field(default_factory=set)
+    failed: set[tuple[str, BodyModel]] = field(default_factory=set)
     made: dict[str, Choices] = field(default_factory=dict)
     out_of_time: bool = False
     skipped: list[str] = field(default_factory=list)
 
-    def run(self) -> tuple[Choices, Tried]:
+    def run(self) -> tuple[Choices, TrialResult]:
         """The choices, and the model that was made of them."""
         choices, tried = self._climb()
         return self._descend(choices, tried)
 
-    def expected(self, name: str, choice: Choice) -> float | None:
+    def expected(self, name: str, choice: BodyModel) -> float | None:
         """Error expected of a choice for one body, None where nothing is known."""
         known = self.evidence.get(name)
         return None if known is None else known.error(choice) * self.in_measure
 
-    def tried(self, choices: Mapping[str, Choice]) -> Tried:
+    def tried(self, choices: Mapping[str, BodyModel]) -> TrialResult:
         """The model with these choices."""
         name = self.name(choices)
         self.made[name] = dict(choices)
         return self.bench.tried(name, self.bodies.scene_of(choices))
 
-    def name(self, choices: Mapping[str, Choice]) -> str:
+    def name(self, choices: Mapping[str, BodyModel]) -> str:
         """A model in words; bodies with the same choice together."""
         together: dict[str, list[str]] = {}
         for body, choice in choices.items():
@@ -69,7 +69,7 @@ class Search:
 
     # --- up -------------------------------------------------------------------------------------
 
-    def _climb(self) -> tuple[Choices, Tried]:
+    def _climb(self) -> tuple[Choices, TrialResult]:
         choices = {name: self._first(name) for name in self.bodies.richest}
         while True:
             tried = self.tried(choices)
@@ -80,7 +80,7 @@ class Search:
                 return dict(self.bodies.richest), self.tried(self.bodies.richest)
             choices = self.richer(choices)
 
-    def _first(self, name: str) -> Choice:
+    def _first(self, name: str) -> BodyModel:
         """The least choice that is expected to suffice."""
         part = _ENOUGH * self.enough / len(self.bodies.richest)
         for choice in self._upward(name):
@@ -89,23 +89,23 @@ class Search:
                 return choice
         return self.bodies.richest[name]
 
-    def _sound(self, name: str, choice: Choice) -> bool:
+    def _sound(self, name: str, choice: BodyModel) -> bool:
         """Whether a level is used within its range: linear kinematics of a body that stiffens by
         its loads may diverge, whatever it deflects."""
         known = self.evidence.get(name)
         return known is None or choice.level not in (ONE_WAY, LINEAR) or not known.stiffens
 
-    def _upward(self, name: str) -> Iterator[Choice]:
+    def _upward(self, name: str) -> Iterator[BodyModel]:
         """Choices from the least to the richest; shapes are added where they deflect most.
 
         One-way responses are no step on the way: where they are cheaper shows when they are run.
         """
         richest = self.bodies.richest[name]
-        yield Choice(RIGID)
+        yield BodyModel(RIGID)
         for shapes in self._shapes_upward(name):
-            yield Choice(LINEAR, shapes)
+            yield BodyModel(LINEAR, shapes)
             if richest.level == STIFFENED:
-                yield Choice(STIFFENED, shapes)
+                yield BodyModel(STIFFENED, shapes)
 
     def _shapes_upward(self, name: str) -> Iterator[tuple[tuple[str, int], ...]]:
         richest = self.bodies.richest[name]
@@ -113,7 +113,7 @@ class Search:
         if VIBRATION in counts:
             yield from (((VIBRATION, n),) for n in range(counts[VIBRATION] + 1))
             return
-        now = Choice(STIFFENED)
+        now = BodyModel(STIFFENED)
         while now.shapes != richest.shapes:
             have = dict(now.shapes)
             open_ones = [word for word, most in counts.items() if have.get(word, 0) < most]
@@ -141,7 +141,7 @@ class Search:
                 raised[name] = self._above(name, choices[name])
         return raised
 
-    def _above(self, name: str, choice: Choice) -> Choice:
+    def _above(self, name: str, choice: BodyModel) -> BodyModel:
         """The next choice of which less is expected; the richest where there is none."""
         upward = list(self._upward(name))
         now = self.expected(name, choice)
@@ -154,7 +154,7 @@ class Search:
 
     # --- down -----------------------------------------------------------------------------------
 
-    def _descend(self, choices: Choices, best: Tried) -> tuple[Choices, Tried]:
+    def _descend(self, choices: Choices, best: TrialResult) -> tuple[Choices, TrialResult]:
         """Less of each body, those with most shapes first, as long as it suffices and is no
         dearer."""
         order = sorted(choices, key=lambda name: -choices[name].total)
@@ -176,26 +176,28 @@ class Search:
                     self.failed.add((name, choice))
         return choices, best
 
-    def _worth_trying(self, name: str, choice: Choice) -> bool:
+    def _worth_trying(self, name: str, choice: BodyModel) -> bool:
         known = self.expected(name, choice)
         most = _DOUBTFUL if choice.level == ONE_WAY else _HOPELESS
         return known is None or known <= most * self.enough
 
-    def _less(self, name: str, choice: Choice) -> Iterator[Choice]:
+    def _less(self, name: str, choice: BodyModel) -> Iterator[BodyModel]:
         """What is less than a choice, the least first."""
         if choice.level == RIGID:
             return
-        yield Choice(RIGID)
+        yield BodyModel(RIGID)
         if choice.level == ONE_WAY:
             return
-        yield Choice(ONE_WAY, self.bodies.richest[name].shapes)  # oscillators cost next to nothing
+        yield BodyModel(
+            ONE_WAY, self.bodies.richest[name].shapes
+        )  # oscillators cost next to nothing
         for word, n in reversed(choice.shapes):
             for count in sorted({0, n // 2, max(n - 1, 0)} - {n}):
                 less = choice.with_count(word, count)
                 if less.total or word == VIBRATION:
                     yield less
         if choice.level == STIFFENED:
-            yield Choice(LINEAR, choice.shapes)
+            yield BodyModel(LINEAR, choice.shapes)
 
     def _more_time(self) -> bool:
         if not self.time_left():

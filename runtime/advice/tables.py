@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..chart.tables import Table, time_of
-from .record import Advice
+from .advice import Advice
 
 
 def summary(advice: Advice) -> list[str]:
@@ -59,7 +59,7 @@ def bodies(advice: Advice) -> Table:
     return head, (3, 4), rows
 
 
-def tried(advice: Advice) -> Table:
+def trial_table(advice: Advice) -> Table:
     """Every model that was run."""
     head = ("model", "error", "CPU time", "note")
     rows = [

@@ -8,10 +8,10 @@ from typing import Any
 
 from mstmm.errors import EnvironmentFailure
 
-from ..host.files import write_text
-from .page import page
-from .picture import installed, plot
-from .record import ChartRecord
+from ..platform_support.safe_files import write_text
+from .chart_record import ChartRecord
+from .html_page import page
+from .matplotlib_plot import has_matplotlib, plot
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Chart(ChartRecord):
         for name, text in (("chart.html", self.to_html()), ("chart.json", self.to_json())):
             write_text(place / name, text)
             made.append(place / name)
-        if installed():
+        if has_matplotlib():
             self.plot(place / "chart.png")
             made.append(place / "chart.png")
         return tuple(made)

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from html import escape
 
-from .drawing import Drawing, Line, Place, decades, time_text
-from .looks import MARKS, Look
-from .point import Point
+from .chart_points import Point
+from .plot_elements import Drawing, Line, Place, decades, time_text
+from .plot_styles import MARKS, PlotStyle
 from .tables import notes, time_of
 
 #: The plane within its box, in units of the picture; room at the left, below, above, at the right.
@@ -69,7 +69,7 @@ def svg(made: Drawing, keys: dict[str, int]) -> str:
     return "\n".join([*parts, "</svg>"])
 
 
-def mark(look: Look, x: float, y: float, size: float) -> str:
+def mark(look: PlotStyle, x: float, y: float, size: float) -> str:
     """One mark."""
     corners = MARKS[look.mark]
     if not corners:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from mstmm.errors import MstmmError
 
-from .point import LeftOut, Point
-from .record import ChartRecord
+from .chart_points import Point, Skipped
+from .chart_record import ChartRecord
 
 #: Of a point whose error may be the reference's own.
 LIMITED = "not more than the reference's own error"
@@ -81,16 +81,16 @@ def notes(point: Point) -> list[str]:
     return [*found, *(f"warns: {text}" for text in point.warnings)]
 
 
-def told(entries: Iterable[LeftOut], refused: bool, most: int = 1000) -> list[str]:
+def skip_reasons(entries: Iterable[Skipped], refused: bool, most: int = 1000) -> list[str]:
     """A sentence for each reason, with at most so many of the methods that it holds for."""
-    reasons: dict[str, dict[str, list[LeftOut]]] = {}
+    reasons: dict[str, dict[str, list[Skipped]]] = {}
     for one in entries:
         if one.refused == refused:
             reasons.setdefault(one.reason, {}).setdefault(one.method, []).append(one)
     return [f"{_named(methods, most)}{reason}" for reason, methods in reasons.items()]
 
 
-def _named(methods: Mapping[str, Sequence[LeftOut]], most: int) -> str:
+def _named(methods: Mapping[str, Sequence[Skipped]], most: int) -> str:
     """rk4, step 1 s and on; dop853 (3 levels): ..."""
     texts = []
     for method, entries in methods.items():

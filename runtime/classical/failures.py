@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 
-def words(lib: Any, failure: int, hinge: str, body: str) -> tuple[str, str]:
+def failure_message(lib: Any, failure: int, hinge: str, body: str) -> tuple[str, str]:
     """Message and remedy of a failure; `hinge` and `body` name the failing element."""
     return {
         lib.MSTMM_CLASSICAL_SINGULAR: (

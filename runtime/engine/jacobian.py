@@ -1,6 +1,6 @@
 """Jacobian of the equations of motion, for implicit integrators: exact, else by differences.
 
-The exact Jacobian is the derivative of the fused kernel (`mstmm.ir.tangent`), run by the
+The exact Jacobian is the derivative of the fused kernel (`mstmm.ir.differentiation`), run by the
 interpreter.  Central differences are used for scenes without that kernel (releases change its form)
 or with so many bodies that its generation takes longer than it saves, and for states at which a
 derivative does not exist.  Their increments never grow: larger ones give no information along a
@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.ir.tangent import PREFIX, tangent
+from mstmm.ir.differentiation import DERIVATIVE_PREFIX, differentiate
 
-from ..kernels.tape import TapeKernel
-from ..pack.structure import structure_of
-from .live import LiveInputs
+from ..kernels.tape_kernel import TapeKernel
+from ..packing.fused_structure import structure_of
+from .live_inputs import LiveInputs
 
 if TYPE_CHECKING:
-    from .compiled import Compiled
+    from .compiled_scene import CompiledScene
 
 Rates = Callable[[float, Array], Array]
 
@@ -31,23 +31,23 @@ Rates = Callable[[float, Array], Array]
 Numbers = Callable[[float, Array], Array]
 
 #: Scenes with more bodies use differences: generating the tangent kernel would take many seconds.
-MOST_BODIES = 64
+MAX_BODIES = 64
 
 #: Increment of a difference, in rad, m and their rates, or relative to a larger number.
-_INCREMENT = 1e-6
+_DIFFERENCE_INCREMENT = 1e-6
 
 
-class Jacobian:
+class OdeJacobian:
     """Jacobian d(dy/dt)/dy for the state y = (q, u), with `with_work` followed by the work.
 
     `rates(t, y)` are the equations, nan where they cannot be evaluated; `memory` (m,) is read at
     every call.  `exact` says which kind it is.
     """
 
-    def __init__(self, model: Compiled, with_work: bool, memory: Array, rates: Rates) -> None:
+    def __init__(self, model: CompiledScene, with_work: bool, memory: Array, rates: Rates) -> None:
         self._rates, self._memory, self._nq = rates, memory, model.nq
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
-        self._tape, self._numbers = _tape(model, self._outputs)
+        self._tape, self._numbers = _tangent_kernel(model, self._outputs)
         #: Held inputs and states of controllers follow what the kernel reads.
         self._n_memory = model.packed.system.held.first
 
@@ -59,34 +59,34 @@ class Jacobian:
     def __call__(self, t: float, y: Array) -> Array:
         """Jacobian (n, n) at y (n,); columns that cannot be evaluated are zero."""
         if self._tape is not None:
-            found = self._differentiated(self._tape, t, y)
-            if np.isfinite(found).all():
-                return found
-        found = self._differenced(t, y)
-        return np.where(np.isfinite(found), found, 0.0)
+            jacobian = self._differentiated(self._tape, t, y)
+            if np.isfinite(jacobian).all():
+                return jacobian
+        jacobian = self._differenced(t, y)
+        return np.where(np.isfinite(jacobian), jacobian, 0.0)
 
     def _differentiated(self, tape: TapeKernel, t: float, y: Array) -> Array:
         n, nq, nu = len(y), self._nq, len(y) - self._nq - (len(self._outputs) == 3)
-        found = np.zeros((n, n))
-        units = np.eye(nq + nu)
-        given = {
+        jacobian = np.zeros((n, n))
+        unit_vectors = np.eye(nq + nu)
+        kernel_inputs = {
             "p": self._numbers(t, self._memory), "t": np.array([t]), "q": y[:nq],
             "u": y[nq : nq + nu], "memory": self._memory[: self._n_memory],
         }  # fmt: skip
-        for j, unit in enumerate(units):
-            directions = {PREFIX + "q": unit[:nq], PREFIX + "u": unit[nq:]}
-            _, outputs = tape.run({**given, **directions})
-            given = {}  # the kernel keeps the inputs of the state
+        for j, unit in enumerate(unit_vectors):
+            directions = {DERIVATIVE_PREFIX + "q": unit[:nq], DERIVATIVE_PREFIX + "u": unit[nq:]}
+            _, outputs = tape.run({**kernel_inputs, **directions})
+            kernel_inputs = {}  # the kernel keeps the inputs of the state
             column = np.concatenate(
-                [outputs[PREFIX + name][:length]
+                [outputs[DERIVATIVE_PREFIX + name][:length]
                  for name, length in zip(self._outputs, (nq, nu, 1), strict=False)
-                 if PREFIX + name in outputs]
+                 if DERIVATIVE_PREFIX + name in outputs]
             )  # fmt: skip
-            found[: len(column), j] = column
-        return found
+            jacobian[: len(column), j] = column
+        return jacobian
 
     def _differenced(self, t: float, y: Array) -> Array:
-        sizes = _INCREMENT * np.maximum(1.0, np.abs(y))
+        sizes = _DIFFERENCE_INCREMENT * np.maximum(1.0, np.abs(y))
         columns = [
             (self._rates(t, y + step) - self._rates(t, y - step)) / (2 * size)
             for step, size in zip(np.diag(sizes), sizes, strict=True)
@@ -94,24 +94,24 @@ class Jacobian:
         return np.array(columns).T
 
 
-def _tape(model: Compiled, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
+def _tangent_kernel(model: CompiledScene, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
     """Tangent kernel of the equations with respect to q and u, or None, and its numbers p."""
-    packed, known = model.packed, model.known or {}
-    if packed.releases or packed.system.count > MOST_BODIES:
-        return None, _nothing
-    structure, numbers = structure_of(packed.system, known, floors=packed.floors)
+    packed, added_elements = model.packed, model.known or {}
+    if packed.releases or packed.system.count > MAX_BODIES:
+        return None, _no_numbers
+    structure, numbers = structure_of(packed.system, added_elements, floors=packed.floors)
     try:
         kernels = model.fusion.fused(structure).kernels
     except (ElementError, EnvironmentFailure):
-        return None, _nothing
+        return None, _no_numbers
     kernel = kernels["accelerations"]
     if "power" in outputs:  # zero in a scene without that kernel: only impacts do work there
         kernel = kernels.get("accelerations_power", kernel)
-    there = [port.name for port in kernel.outputs if port.name in outputs]
-    tape = TapeKernel(tangent(kernel, ["q", "u"], there, values=False, guards=False))
+    output_names = [port.name for port in kernel.outputs if port.name in outputs]
+    tape = TapeKernel(differentiate(kernel, ["q", "u"], output_names, values=False, guards=False))
     live = LiveInputs(packed.system, structure.inputs)
     return tape, lambda t, memory: live.now(numbers, t, memory)
 
 
-def _nothing(_t: float, _memory: Array) -> Array:
+def _no_numbers(_t: float, _memory: Array) -> Array:
     return np.zeros(0)

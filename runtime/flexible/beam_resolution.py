@@ -11,23 +11,23 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from .beam.holding import Holding
-from .beam.ports import BeamShapes
+from .beam.boundary_conditions import BoundaryConditions
+from .beam.section_ports import BeamShapes
 from .beam.shape_fields import ROW
 from .beam.static_shapes import bending_matrices, divided, node_at, rod_matrices
 from .resolution import resolved_frequency
 
 
-def beam_resolution(shapes: BeamShapes, held: Holding) -> float:
+def beam_resolution(shapes: BeamShapes, held: BoundaryConditions) -> float:
     """rad/s up to which the shapes of a beam hold in all directions that it has some in; infinite
     without any."""
     directions = dict.fromkeys(mode.direction for mode in shapes.modes)
     return min((_of_direction(shapes, held, d) for d in directions), default=np.inf)
 
 
-def _of_direction(shapes: BeamShapes, held: Holding, direction: str) -> float:
+def _of_direction(shapes: BeamShapes, held: BoundaryConditions, direction: str) -> float:
     own = [k for k, mode in enumerate(shapes.modes) if mode.direction == direction]
     nodes = divided(shapes.data, len(own) + 2, (held.x, *(end.x for end in held.ends)))
     bends = direction in ("y", "z")
@@ -55,7 +55,7 @@ def _columns(shapes: BeamShapes, own: list[int], direction: str, nodes: Array) -
     return found
 
 
-def _conditions(held: Holding, direction: str, nodes: Array) -> Iterator[list[int]]:
+def _conditions(held: BoundaryConditions, direction: str, nodes: Array) -> Iterator[list[int]]:
     """Unknowns that are held: by the hinge alone, and by all that hangs on the beam too."""
     bends = direction in ("y", "z")
     turns = direction in held.turns

@@ -7,11 +7,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
+from .mass_moments import Moments
 from .modal_body import ModalBody
 from .modal_port import ModalPort
-from .moments import Moments
 
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 #: (a, b) with eps_iab = 1, by i.

@@ -17,11 +17,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mstmm.arrays import Array, Integers
+from mstmm.array_validation import Array, Integers
 
-from .beam.ports import BeamShapes
+from .beam.section_ports import BeamShapes
+from .mass_moments import Moments
 from .modal_port import MassPoint, ModalPort
-from .moments import Moments
 from .truncation import Truncation
 
 

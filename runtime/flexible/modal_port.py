@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 #: Part by which a frequency may be too high for its motion still to be one of the shapes.
 _GOOD = 0.05

@@ -9,15 +9,15 @@ from numbers import Real
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arguments import word_of
-from mstmm.arrays import numbers, real, whole
+from mstmm.argument_validation import require_word
+from mstmm.array_validation import finite_array, finite_float, integer
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import SceneError
 
 from .steppers import AUTO, AUTO_EXPLICIT, TANGENTS, check_radius, check_tangent
 
 #: Smaller absolute tolerances are raised to this: squares of scaled errors must not overflow.
-_LEAST = 1e-100
+_MIN_ATOL = 1e-100
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Settings:
         return AUTO_EXPLICIT if self.method == AUTO else self.method
 
 
-def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
+def to_output_times(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, ...] | None:
     """Output times (s) as a tuple, also from a single number.
 
     Raises SceneError for times that do not increase and for a single integer, which could be a
@@ -61,96 +61,102 @@ def times_of(output_times: ArrayLike | Sequence[float] | None) -> tuple[float, .
     """
     if output_times is None:
         return None
-    found = numbers("output_times", output_times)
-    if found.ndim == 0 and np.asarray(output_times).dtype.kind in "iu":
-        n = int(found)
+    given_times = finite_array("output_times", output_times)
+    if given_times.ndim == 0 and np.asarray(output_times).dtype.kind in "iu":
+        count = int(given_times)
         raise SceneError(
-            f"output_times = {n}: expected times in s, found an integer, which may be a time "
-            f"or a number of samples; write [{n:.1f}] for one sample at {n} s, or "
-            f"numpy.linspace(t_start, t_end, {max(n, 2)}) for equally spaced samples"
+            f"output_times = {count}: expected times in s, found an integer, which may be a time "
+            f"or a number of samples; write [{count:.1f}] for one sample at {count} s, or "
+            f"numpy.linspace(t_start, t_end, {max(count, 2)}) for equally spaced samples"
         )
-    if found.ndim > 1:
-        raise SceneError(f"output_times have shape {found.shape}, expected (n,): times in s")
-    times = np.atleast_1d(found)
-    rises = times[1:] > times[:-1]
-    if not rises.all():
-        falls = np.flatnonzero(~rises)
-        before, after = times[falls[0]], times[falls[0] + 1]
+    if given_times.ndim > 1:
+        raise SceneError(f"output_times have shape {given_times.shape}, expected (n,): times in s")
+    times = np.atleast_1d(given_times)
+    is_increasing = times[1:] > times[:-1]
+    if not is_increasing.all():
+        descents = np.flatnonzero(~is_increasing)
+        previous, following = times[descents[0]], times[descents[0] + 1]
         raise SceneError(
-            f"output_times: {after:g} s follows {before:g} s; expected increasing times in s"
+            f"output_times: {following:g} s follows {previous:g} s; expected increasing times in s"
         )
     return tuple(times.tolist())
 
 
-def checked(settings: Settings) -> Settings:
+def validate(settings: Settings) -> Settings:
     """Validate settings and convert them to plain finite numbers.
 
     Raises SceneError that names the first invalid one.
     """
-    t_start = real("t_start", settings.t_start, "a time in s")
-    t_end = real("t_end", settings.t_end, "a time in s, not before t_start")
+    t_start = finite_float("t_start", settings.t_start, "a time in s")
+    t_end = finite_float("t_end", settings.t_end, "a time in s, not before t_start")
     if t_end < t_start:
         raise SceneError(f"t_end = {t_end:g}: expected a time in s, not before t_start")
-    word_of("method", settings.method, "a name such as dop853")
-    word_of("scheme", settings.scheme, "a name such as hht:0.3")
+    require_word("method", settings.method, "a name such as dop853")
+    require_word("scheme", settings.scheme, "a name such as hht:0.3")
     if settings.method == AUTO and settings.step is not None:
         raise SceneError(
             f'step = {settings.step!r}: method "{AUTO}" chooses its steps; omit step, or name a '
             "method"
         )
-    _times_within(settings.output_times, t_start, t_end)
-    longest = settings.max_step
-    if settings.step is not None and _longest(longest):
+    _check_output_times(settings.output_times, t_start, t_end)
+    max_step = settings.max_step
+    if settings.step is not None and _max_step(max_step):
         raise SceneError(
-            f"max_step = {longest!r}: limits steps that the method chooses, but step = "
+            f"max_step = {max_step!r}: limits steps that the method chooses, but step = "
             f"{settings.step!r} fixes all steps; omit one of the two"
         )
     return replace(
         settings,
-        t_start=t_start, t_end=t_end,
-        rtol=_above_zero("rtol", settings.rtol, "a relative tolerance above zero"),
-        atol=max(_LEAST, _above_zero("atol", settings.atol, "an absolute tolerance above zero")),
-        step=None if settings.step is None
-        else _above_zero("step", settings.step, "a time above zero, in s"),
-        max_step=_longest(longest),
-        max_steps=whole(
+        t_start=t_start,
+        t_end=t_end,
+        rtol=_require_positive("rtol", settings.rtol, "a relative tolerance above zero"),
+        atol=max(
+            _MIN_ATOL, _require_positive("atol", settings.atol, "an absolute tolerance above zero")
+        ),
+        step=None
+        if settings.step is None
+        else _require_positive("step", settings.step, "a time above zero, in s"),
+        max_step=_max_step(max_step),
+        max_steps=integer(
             "max_steps", settings.max_steps, 0, "a whole number of steps, or 0 for no limit"
         ),
-        tangent=_tangent(settings),
-        radius=None if settings.radius is None else _radius(settings.method, settings.radius),
-        iterations=whole(
+        tangent=_checked_tangent(settings),
+        radius=None
+        if settings.radius is None
+        else _checked_radius(settings.method, settings.radius),
+        iterations=integer(
             "iterations", settings.iterations, 1, "a whole number of iterations, 1 or more"
         ),
-    )  # fmt: skip
+    )
 
 
-def _longest(value: float) -> float:
+def _max_step(value: float) -> float:
     """Longest step, s, 0 for no limit."""
     if isinstance(value, Real) and value in (0, np.inf):
         return 0.0
-    return _above_zero("max_step", value, "a time above zero in s, or 0 for no limit")
+    return _require_positive("max_step", value, "a time above zero in s, or 0 for no limit")
 
 
-def _tangent(settings: Settings) -> str:
-    word_of("tangent", settings.tangent, f"one of {', '.join(TANGENTS)}")
+def _checked_tangent(settings: Settings) -> str:
+    require_word("tangent", settings.tangent, f"one of {', '.join(TANGENTS)}")
     check_tangent(settings.method, settings.tangent)
     return settings.tangent
 
 
-def _radius(method: str, value: float) -> float:
-    found = real("radius", value, "a spectral radius from 0 to 1")
-    check_radius(method, found)
-    return found
+def _checked_radius(method: str, value: float) -> float:
+    spectral_radius = finite_float("radius", value, "a spectral radius from 0 to 1")
+    check_radius(method, spectral_radius)
+    return spectral_radius
 
 
-def _above_zero(name: str, value: float, expected: str) -> float:
-    found = real(name, value, expected)
-    if not found > 0:
-        raise SceneError(f"{name} = {found:g}: expected {expected}")
-    return found
+def _require_positive(name: str, value: float, expected: str) -> float:
+    number = finite_float(name, value, expected)
+    if not number > 0:
+        raise SceneError(f"{name} = {number:g}: expected {expected}")
+    return number
 
 
-def _times_within(times: tuple[float, ...] | None, t_start: float, t_end: float) -> None:
+def _check_output_times(times: tuple[float, ...] | None, t_start: float, t_end: float) -> None:
     """Raise SceneError for output times outside the run."""
     if times and (times[0] < t_start or times[-1] > t_end):
         raise SceneError(

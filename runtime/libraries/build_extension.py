@@ -23,11 +23,11 @@ GENERATED = Path("generated")
 #: Folders with the C of the module, and a folder whose text that C includes.
 FOLDERS = (
     GENERATED, Path("runtime/engine/c"), Path("runtime/integrate/c"), Path("runtime/classical/c"),
-    Path("runtime/engine/states/c"),
+    Path("runtime/engine/state_evaluation/c"),
 )  # fmt: skip
-PASTED = Path("templates")
+INCLUDED_TEXT = Path("templates")
 #: Unit that includes other .c files, which are not compiled separately.
-PASSES = Path("runtime/engine/c/passes.c")
+INCLUDING_UNIT = Path("runtime/engine/c/passes.c")
 
 MODULE = "mstmm.generated._kernels"
 
@@ -52,25 +52,25 @@ def headers(folders: Sequence[Path]) -> list[Path]:
 
     ValueError for a name in two folders, and for headers that include each other.
     """
-    named: dict[str, Path] = {}
+    headers_by_name: dict[str, Path] = {}
     for header in (header for folder in folders for header in sorted(folder.glob("*.h"))):
-        if header.name in named:
-            raise ValueError(f"{header} has the name of {named[header.name]}")
-        named[header.name] = header
-    ordered: list[Path] = []
+        if header.name in headers_by_name:
+            raise ValueError(f"{header} has the name of {headers_by_name[header.name]}")
+        headers_by_name[header.name] = header
+    ordered_headers: list[Path] = []
 
     def visit(header: Path, including: tuple[Path, ...]) -> None:
         if header in including:
             raise ValueError(f"{header} includes itself through {including[-1]}")
-        if header in ordered:
+        if header in ordered_headers:
             return
         for name in _INCLUDE.findall(header.read_text()):
-            visit(named[name], (*including, header))
-        ordered.append(header)
+            visit(headers_by_name[name], (*including, header))
+        ordered_headers.append(header)
 
-    for name in sorted(named):
-        visit(named[name], ())
-    return ordered
+    for name in sorted(headers_by_name):
+        visit(headers_by_name[name], ())
+    return ordered_headers
 
 
 def cdef(header: Path) -> str:
@@ -82,7 +82,7 @@ def cdef(header: Path) -> str:
     return "\n".join(block.strip() for block in blocks)
 
 
-def built_from(root: Path) -> str:
+def source_hash(root: Path) -> str:
     """SHA-256 of the C in the folders below `root`; "" without a manifest of the generated C.
 
     The manifest contains hashes of the generated text; the other files are read.
@@ -90,17 +90,17 @@ def built_from(root: Path) -> str:
     manifest = root / GENERATED / "manifest.json"
     if not manifest.is_file():
         return ""
-    found = hashlib.sha256(manifest.read_bytes())
-    for path in written_by_hand(root):
-        found.update(f"{path.name}\n".encode() + path.read_bytes())
-    return found.hexdigest()
+    digest = hashlib.sha256(manifest.read_bytes())
+    for path in hand_written_sources(root):
+        digest.update(f"{path.name}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
 
 
-def written_by_hand(root: Path) -> list[Path]:
+def hand_written_sources(root: Path) -> list[Path]:
     """C files below `root` that are not generated, by folder and name."""
     folders = [root / folder for folder in FOLDERS if folder != GENERATED]
     paths = [path for folder in folders for path in sorted(folder.glob("*.[ch]"))]
-    return [*paths, *sorted((root / PASTED).glob("*.c"))]
+    return [*paths, *sorted((root / INCLUDED_TEXT).glob("*.c"))]
 
 
 def ffibuilder() -> FFI:
@@ -110,18 +110,29 @@ def ffibuilder() -> FFI:
     if not any(GENERATED.glob("*.c")):
         raise FileNotFoundError(f"no C source in {GENERATED}/; run `python -m mstmm generate`")
     sources = [source for folder in FOLDERS for source in sorted(folder.glob("*.c"))]
-    part = _INCLUDE.findall(PASSES.read_text()) if PASSES.is_file() else ()
-    found, parts = headers(FOLDERS), [source for source in sources if source.name in part]
+    included_names = (
+        _INCLUDE.findall(INCLUDING_UNIT.read_text()) if INCLUDING_UNIT.is_file() else ()
+    )
+    header_paths, included_sources = (
+        headers(FOLDERS),
+        [source for source in sources if source.name in included_names],
+    )
     builder = FFI()
-    builder.cdef("\n".join(cdef(header) for header in found))
+    builder.cdef("\n".join(cdef(header) for header in header_paths))
     builder.cdef(f"static char *const {BUILT_FROM};")
-    identity = f'static char *const {BUILT_FROM} = "{built_from(Path())}";'
+    identity = f'static char *const {BUILT_FROM} = "{source_hash(Path())}";'
     builder.set_source(
         MODULE,
-        "\n".join([*(f'#include "{header.name}"' for header in found), identity]),
-        sources=[source.as_posix() for source in sources if source not in parts],
-        depends=[path.as_posix() for path in (*found, *parts, *sorted(PASTED.glob("*.c")))],
-        include_dirs=[*(folder.as_posix() for folder in (*FOLDERS, PASTED)), np.get_include()],
+        "\n".join([*(f'#include "{header.name}"' for header in header_paths), identity]),
+        sources=[source.as_posix() for source in sources if source not in included_sources],
+        depends=[
+            path.as_posix()
+            for path in (*header_paths, *included_sources, *sorted(INCLUDED_TEXT.glob("*.c")))
+        ],
+        include_dirs=[
+            *(folder.as_posix() for folder in (*FOLDERS, INCLUDED_TEXT)),
+            np.get_include(),
+        ],
         extra_compile_args=[*COMPILE_ARGS, *WARNING_ARGS],
         libraries=["m"],
         py_limited_api=True,

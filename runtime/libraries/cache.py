@@ -18,15 +18,15 @@ from pathlib import Path
 from typing import TypeVar
 
 from mstmm import version
-from mstmm.border.elements import ABI
+from mstmm.abi.element_library import ABI_VERSION
 from mstmm.errors import EnvironmentFailure
 
-from . import processor, toolchain
-from .build import Built, Order, fetched, found, remove
-from .entry import FORMAT, Damaged
-from .folder import VARIABLE, limit, private_folder
+from . import cpu_features, toolchain
+from .cache_entry import FORMAT, DamagedEntryError
+from .cache_folder import VARIABLE, private_folder, size_limit
+from .library_build import BuildOrder, BuiltLibrary, find_library, get_or_build, remove
 
-__all__ = ["Built", "Recipe", "find", "library", "opened"]
+__all__ = ["BuiltLibrary", "Recipe", "find", "library", "open_cached_library"]
 
 T = TypeVar("T")
 
@@ -59,16 +59,16 @@ class Recipe:
     optional: tuple[str, ...] = ()
 
 
-def find(recipe: Recipe) -> Built | None:
+def find(recipe: Recipe) -> BuiltLibrary | None:
     """Find a valid library in the cache without compiling, else None.  Never raises."""
     try:
-        place, order = _placed(recipe)
-        return found(place, order.key)
-    except (EnvironmentFailure, Damaged):
+        place, order = _place_and_order(recipe)
+        return find_library(place, order.key)
+    except (EnvironmentFailure, DamagedEntryError):
         return None
 
 
-def library(recipe: Recipe, *, timeout: float | None = None) -> Built:
+def library(recipe: Recipe, *, timeout: float | None = None) -> BuiltLibrary:
     """Library of a recipe, from the cache or newly built.
 
     `timeout` limits the compiler, s (300 by default, $MSTMM_COMPILE_TIMEOUT overrides the default).
@@ -76,23 +76,23 @@ def library(recipe: Recipe, *, timeout: float | None = None) -> Built:
     killed; a cache folder that cannot be written, belongs to another user, or is full;
     an invalid $MSTMM_CACHE_SIZE.
     """
-    limit()  # report an invalid limit before a compiler runs
-    place, order = _placed(recipe)
-    built = fetched(place, order, toolchain.time_limit() if timeout is None else timeout)
+    size_limit()  # report an invalid limit before a compiler runs
+    place, order = _place_and_order(recipe)
+    built = get_or_build(place, order, toolchain.time_limit() if timeout is None else timeout)
     if built.how == "compiled":
-        from .upkeep import tidy
+        from .cache_maintenance import limit_cache
 
-        tidy(place.parent, keep=place)
+        limit_cache(place.parent, keep=place)
     return built
 
 
-def opened(
+def open_cached_library(
     recipe: Recipe,
     opener: Callable[[Path, str], T],
     *,
-    known: Built | None = None,
+    known: BuiltLibrary | None = None,
     timeout: float | None = None,
-) -> tuple[T, Built]:
+) -> tuple[T, BuiltLibrary]:
     """Open the library of a recipe with `opener(path, key)`; rebuild it once if that fails.
 
     `known` is the result of a preceding `find`, which saves a second search.
@@ -114,21 +114,23 @@ def opened(
         raise EnvironmentFailure(f"{built.path} cannot be opened: {error}") from error
 
 
-def _placed(recipe: Recipe) -> tuple[Path, Order]:
+def _place_and_order(recipe: Recipe) -> tuple[Path, BuildOrder]:
     """Place of the library of a recipe in the cache, and its build order."""
-    about = {
+    description = {
         "identity": dict(sorted(recipe.identity.items())),
         "flags": list(recipe.flags),
         "optional": list(recipe.optional),
-        "compiler": toolchain.compiler().identity(),
-        "processor": processor.features(),
+        "compiler": toolchain.find_compiler().identity(),
+        "processor": cpu_features.features(),
         "platform": f"{sys.platform} {os.uname().machine} {sys.byteorder} {sys.maxsize}",
         "mstmm": version.__version__,
-        "abi": f"{FORMAT} {ABI}",
+        "abi": f"{FORMAT} {ABI_VERSION}",
     }
-    key = hashlib.sha256(json.dumps([recipe.name, about], sort_keys=True).encode()).hexdigest()
-    order = Order(
-        recipe.name, key, recipe.sources, recipe.flags, recipe.symbols, VARIABLE, about,
+    key = hashlib.sha256(
+        json.dumps([recipe.name, description], sort_keys=True).encode()
+    ).hexdigest()
+    order = BuildOrder(
+        recipe.name, key, recipe.sources, recipe.flags, recipe.symbols, VARIABLE, description,
         recipe.optional,
     )  # fmt: skip
     return private_folder() / f"{recipe.name}-{key[:32]}", order

@@ -9,12 +9,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..host.process import Hanging, run
+from ..platform_support.subprocesses import ProcessTimeout, run
 
 #: Name of the self-test `int (void)` that a library may export; 0 is success.
-OWN_TEST = "mstmm_self_test"
+SELF_TEST_SYMBOL = "mstmm_self_test"
 
-_TIMEOUT = 60.0
+_TIMEOUT_S = 60.0
 
 # Without site and with the standard library alone: about 12 ms.
 _SCRIPT = f"""\
@@ -22,7 +22,7 @@ import ctypes, os, sys
 library = ctypes.CDLL(sys.argv[1], os.RTLD_NOW)
 for name in sys.argv[2:]:
     getattr(library, name)
-test = getattr(library, {OWN_TEST!r}, None)
+test = getattr(library, {SELF_TEST_SYMBOL!r}, None)
 if test is not None and test() != 0:
     sys.exit("its self-test failed")
 """
@@ -33,18 +33,18 @@ def problem(library: Path, symbols: Sequence[str]) -> str:
     if not sys.executable:  # Python inside another program
         return ""
     try:
-        ended = run(
+        result = run(
             [sys.executable, "-I", "-S", "-c", _SCRIPT, str(library), *symbols],
             library.parent,
-            _TIMEOUT,
+            _TIMEOUT_S,
         )
-    except Hanging:
-        return f"it did not return within {_TIMEOUT:g} s"
+    except ProcessTimeout:
+        return f"it did not return within {_TIMEOUT_S:g} s"
     except OSError:
         return ""
-    if ended.code == 0:
+    if result.code == 0:
         return ""
-    if ended.code < 0:
-        return f"it crashes ({ended.signal()})"
-    lines = ended.said.splitlines()
-    return lines[-1].strip()[:300] if lines else f"its test ended with code {ended.code}"
+    if result.code < 0:
+        return f"it crashes ({result.signal()})"
+    lines = result.said.splitlines()
+    return lines[-1].strip()[:300] if lines else f"its test ended with code {result.code}"

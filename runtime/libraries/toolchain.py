@@ -17,23 +17,29 @@ from typing import TYPE_CHECKING
 from mstmm.errors import EnvironmentFailure
 
 if TYPE_CHECKING:
-    from ..host.process import Ended
+    from ..platform_support.subprocesses import ProcessResult
 
 #: Wall time, s, after which a compilation is stopped, and the variable that overrides it.
 TIMEOUT, TIMEOUT_VARIABLE = 300.0, "MSTMM_COMPILE_TIMEOUT"
 
 #: Messages for a full disk, an exhausted quota and a file size limit.
-_NO_ROOM = (
+_NO_SPACE_MESSAGES = (
     "No space left on device", "Disk quota exceeded", "File too large", "File size limit exceeded",
 )  # fmt: skip
 
 #: Messages of gcc and clang for an unknown option.
-_UNKNOWN = re.compile("unknown argument|unrecognized|unsupported option|not supported")
+_UNKNOWN_OPTION = re.compile("unknown argument|unrecognized|unsupported option|not supported")
 
 #: Environment variables that change the headers and libraries that gcc and clang use.
-_VARIABLES = ("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "COMPILER_PATH", "GCC_EXEC_PREFIX")
+_SEARCH_PATH_VARIABLES = (
+    "CPATH",
+    "C_INCLUDE_PATH",
+    "LIBRARY_PATH",
+    "COMPILER_PATH",
+    "GCC_EXEC_PREFIX",
+)
 
-_INSTALL = "install one (apt-get install gcc) or set the variable CC"
+_INSTALL_REMEDY = "install one (apt-get install gcc) or set the variable CC"
 
 
 @dataclass(frozen=True)
@@ -47,39 +53,47 @@ class Compiler:
 
     def identity(self) -> dict[str, str]:
         """All data that may change the compiler's output, read without running a process."""
-        set_here = {name: os.environ[name] for name in _VARIABLES if os.environ.get(name)}
+        search_paths = {
+            name: os.environ[name] for name in _SEARCH_PATH_VARIABLES if os.environ.get(name)
+        }
         return {
             "command": shlex.join(self.command), "path": self.path, "size": str(self.size),
-            "modified": str(self.modified), "libc": _libc(), **set_here,
+            "modified": str(self.modified), "libc": _libc_version(), **search_paths,
         }  # fmt: skip
 
 
-def compiler() -> Compiler:
+def find_compiler() -> Compiler:
     """Find the C compiler: $CC, else gcc, cc or clang.  EnvironmentFailure if there is none."""
     try:
-        wanted = shlex.split(os.environ.get("CC") or "")
+        configured_words = shlex.split(os.environ.get("CC") or "")
     except ValueError:
-        raise EnvironmentFailure(f"CC={os.environ['CC']!r} is not a command; {_INSTALL}") from None
-    for words in [wanted] if wanted else [["gcc"], ["cc"], ["clang"]]:
+        raise EnvironmentFailure(
+            f"CC={os.environ['CC']!r} is not a command; {_INSTALL_REMEDY}"
+        ) from None
+    for words in [configured_words] if configured_words else [["gcc"], ["cc"], ["clang"]]:
         program = shutil.which(words[0])
         if program is not None:
-            return _identified((os.path.abspath(program), *words[1:]))
-    missing = f"CC names {wanted[0]}, which does not exist" if wanted else "no gcc, cc or clang"
-    raise EnvironmentFailure(f"no C compiler found ({missing}); {_INSTALL}")
+            return _identify_compiler((os.path.abspath(program), *words[1:]))
+    missing = (
+        f"CC names {configured_words[0]}, which does not exist"
+        if configured_words
+        else "no gcc, cc or clang"
+    )
+    raise EnvironmentFailure(f"no C compiler found ({missing}); {_INSTALL_REMEDY}")
 
 
-def _identified(command: tuple[str, ...]) -> Compiler:
+def _identify_compiler(command: tuple[str, ...]) -> Compiler:
     path = os.path.realpath(command[0])
     try:
         status = os.stat(path)
     except OSError as error:
         raise EnvironmentFailure(
-            f"the C compiler {path} cannot be examined ({error.strerror}); {_INSTALL}"
+            f"the C compiler {path} cannot be examined ({error.strerror}); {_INSTALL_REMEDY}"
         ) from None
     return Compiler(command, path, status.st_size, status.st_mtime_ns)
 
 
-def _libc() -> str:
+def _libc_version() -> str:
     try:
         return os.confstr("CS_GNU_LIBC_VERSION") or "unknown"
     except (AttributeError, OSError, ValueError):
@@ -103,16 +117,16 @@ def time_limit() -> float:
     return value
 
 
-def version(found: Compiler, folder: Path) -> str:
+def compiler_version(found: Compiler, folder: Path) -> str:
     """First line of the output of `--version`, run in `folder`."""
-    from ..host.process import Hanging, run
+    from ..platform_support.subprocesses import ProcessTimeout, run
 
     try:
-        ended = run([*found.command, "--version"], folder, 10.0)
-    except (Hanging, OSError):
+        result = run([*found.command, "--version"], folder, 10.0)
+    except (ProcessTimeout, OSError):
         return "unknown"
-    lines = ended.said.splitlines()
-    return lines[0].strip() if ended.code == 0 and lines else "unknown"
+    lines = result.said.splitlines()
+    return lines[0].strip() if result.code == 0 and lines else "unknown"
 
 
 def library_suffix() -> str:
@@ -139,41 +153,41 @@ def build(
     Raises EnvironmentFailure, one line, if the compiler cannot be run, fails, is killed, does not
     end within `timeout` s, or writes no library.
     """
-    begin = time.perf_counter()
-    kept = tuple(flags)
+    start_time = time.perf_counter()
+    kept_flags = tuple(flags)
     while True:
-        ended = _compiled(found, sources, target, kept, timeout)
-        unknown = _unknown(ended, optional) & set(kept)
-        if not unknown:
+        result = _run_compiler(found, sources, target, kept_flags, timeout)
+        unsupported = _unsupported_flags(result, optional) & set(kept_flags)
+        if not unsupported:
             break
-        kept = tuple(flag for flag in kept if flag not in unknown)
-    if ended.code != 0:
-        raise EnvironmentFailure(_reason(found, ended, sources[0].name))
+        kept_flags = tuple(flag for flag in kept_flags if flag not in unsupported)
+    if result.code != 0:
+        raise EnvironmentFailure(_failure_text(found, result, sources[0].name))
     if not target.is_file() or target.stat().st_size == 0:
         raise EnvironmentFailure(
             f"the C compiler {found.command[0]} reported success but wrote no library; "
             "see mstmm doctor"
         )
-    return Compilation(time.perf_counter() - begin, kept)
+    return Compilation(time.perf_counter() - start_time, kept_flags)
 
 
-def _unknown(ended: Ended, optional: Sequence[str]) -> set[str]:
+def _unsupported_flags(ended: ProcessResult, optional: Sequence[str]) -> set[str]:
     """Optional flags that a failed compiler names in a message about unknown options."""
-    complaints = [line for line in ended.said.splitlines() if _UNKNOWN.search(line)]
-    named = {word.strip("'\"`‘’;,") for line in complaints for word in line.split()}
-    return named & set(optional) if ended.code != 0 else set()
+    complaints = [line for line in ended.said.splitlines() if _UNKNOWN_OPTION.search(line)]
+    mentioned_words = {word.strip("'\"`‘’;,") for line in complaints for word in line.split()}
+    return mentioned_words & set(optional) if ended.code != 0 else set()
 
 
-def _compiled(
+def _run_compiler(
     found: Compiler, sources: Sequence[Path], target: Path, flags: Sequence[str], timeout: float
-) -> Ended:
-    from ..host.process import Hanging, run
+) -> ProcessResult:
+    from ..platform_support.subprocesses import ProcessTimeout, run
 
     folder = sources[0].parent
     command = [*found.command, *flags, "-fPIC", "-shared", *map(str, sources), "-lm"]
     try:
         return run([*command, "-o", str(target)], folder, timeout, TMPDIR=str(folder))
-    except Hanging:
+    except ProcessTimeout:
         raise EnvironmentFailure(
             f"the C compiler {found.command[0]} did not finish within {timeout:g} s of wall time "
             f"and was stopped; set {TIMEOUT_VARIABLE} to more seconds, or see mstmm doctor"
@@ -185,10 +199,10 @@ def _compiled(
         ) from None
 
 
-def _reason(found: Compiler, ended: Ended, source: str) -> str:
+def _failure_text(found: Compiler, ended: ProcessResult, source: str) -> str:
     """Reason that a compilation failed, one line with a remedy."""
     program = found.command[0]
-    if any(text in ended.said for text in _NO_ROOM) or ended.code == -signal.SIGXFSZ:
+    if any(text in ended.said for text in _NO_SPACE_MESSAGES) or ended.code == -signal.SIGXFSZ:
         return (
             f"the C compiler {program} found no space on the disk; free some, or choose another "
             "folder (MSTMM_CACHE; for user-defined elements MSTMM_KERNELS)"
@@ -197,9 +211,12 @@ def _reason(found: Compiler, ended: Ended, source: str) -> str:
         hint = " (too little memory?)" if -ended.code == signal.SIGKILL else ""
         return f"the C compiler {program} was killed by {ended.signal()}{hint}; see mstmm doctor"
     lines = [line.strip() for line in ended.said.splitlines() if line.strip()]
-    first = next((line for line in lines if "error" in line), lines[-1] if lines else "no message")
-    shown = "".join(c if c.isprintable() else " " for c in first)[:300]
+    error_line = next(
+        (line for line in lines if "error" in line), lines[-1] if lines else "no message"
+    )
+    printable_line = "".join(c if c.isprintable() else " " for c in error_line)[:300]
     return (
-        f"the C compiler {program} could not compile {source} (exit code {ended.code}: {shown}); "
+        f"the C compiler {program} could not compile {source} (exit code {ended.code}: "
+        f"{printable_line}); "
         "see mstmm doctor"
     )

@@ -1,106 +1,320 @@
-"""The motions of a linear model, from its matrices or, of many, by its operators."""
+"""Natural motions of a linear model: frequencies, damping, shapes, and what carries them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import eig, eigh
+from numpy.typing import NDArray
 
-from mstmm.arrays import Array
-from mstmm.errors import NumericalFailure
+from mstmm.array_validation import Array, finite_float
+from mstmm.errors import SceneError
+from mstmm.risk import AssessedAnswer, Risk, information
+from mstmm.safe_text import abbreviate_names
 
-from .motions import Modes
+from ..engine.characteristic_scales import scene_length
+from ..risk_checks.shape_range import motion_range_risks, shape_limits
+from . import energy_shares, file_formats
+from .rotors.displacements import whirl
+from .rotors.fixed_frame import frame_of
 
 if TYPE_CHECKING:
-    from .equations import Equations
+    from ..result.scene3d.view import SceneView
+    from .linear_equations import LinearEquations
 
-#: More coordinates than this have their slowest motions found without a matrix.
-_DENSE = 400
-#: A stiffness further from symmetric than this, in parts, is not that of a potential.
-_SYMMETRIC = 1e-9
-#: Rates in parts of the fastest that are rounding: eigenvalues are found to its square.
-_ROUNDING = 1e-7
+#: Shapes in a picture unless others are asked for.
+_PANELS = 6
+#: Names of the risks of single inputs, and of single outputs; motions have neither.
+INPUT_RISKS, OUTPUT_LEFT_OUT = ("changing-input", "input-without-effect"), "output-left-out"
+CHANNEL_RISKS = (*INPUT_RISKS, OUTPUT_LEFT_OUT)
 
-
-def modes(linear: Equations, count: int | None, damped: bool | None) -> Modes:
-    """See `Linear.modes`."""
-    few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
-    few = few and linear.mechanism is None and linear.carrying is None
-    if count is None or not few or linear.turning is not None:
-        found = _dense(linear, damped)
-        return found if count is None else found.first(count)
-    return _few(linear, count, damped)
+Complex = NDArray[np.complex128]
 
 
-def _few(linear: Equations, count: int, damped: bool | None) -> Modes:
-    from . import lanczos
+@dataclass(frozen=True, eq=False)
+class Modes(AssessedAnswer):
+    """k motions x(t) = Re(shape exp(eigenvalue t)) near a state, by rising omega.
 
-    pencil = linear.pencil
-    x = np.random.default_rng(0).standard_normal(len(linear))
-    with_c = bool(pencil.damping(x).any()) if damped is None else damped
-    if with_c or pencil.skew() > _SYMMETRIC:
-        slowest = lanczos.damped(pencil, count, with_c)
-        return Modes(linear, slowest.values, slowest.shapes, None)
-    slowest = lanczos.undamped(pencil, count)
-    return _ordered(linear, slowest.values, slowest.shapes, slowest.complete)
+    Attributes:
+        linear: the linear model.
+        eigenvalues: (k,) complex, 1/s; of a pair the one with positive imaginary part.
+        shapes: (n, k), real with unit modal mass where there is neither damping nor gyroscopic
+            load, else complex with the largest entry 1.
+        complete: whether no mode below the last one is missing; None where that is not counted.
+    """
 
+    linear: LinearEquations = field(repr=False)
+    eigenvalues: Complex
+    shapes: NDArray[Any] = field(repr=False)
+    complete: bool | None
 
-def _dense(linear: Equations, damped: bool | None) -> Modes:
-    """All motions, from the matrices."""
-    with_c = linear.C.any() if damped is None else damped
-    if with_c or not _from_potential(linear.K):
-        return _general(linear, linear.C if with_c else np.zeros_like(linear.C))
-    return _ordered(linear, *_symmetric(linear), True)
+    def __repr__(self) -> str:
+        if not len(self):
+            return "<Modes: none>"
+        about = f"{len(self)}, {self.omega[0]:.6g} to {self.omega[-1]:.6g} rad/s"
+        return f"<Modes: {about}{', rotating frame' if self.frame == 'rotating' else ''}>"
 
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
 
-def _ordered(linear: Equations, squares: Array, shapes: Array, complete: bool | None) -> Modes:
-    """Of omega^2; below 0 a motion grows and another decays, and the growing one is told."""
-    rates = np.sqrt(np.abs(squares))
-    values = np.where(squares < 0, rates + 0j, 1j * rates)
-    order = np.argsort(rates, kind="stable")
-    return Modes(linear, values[order], shapes[:, order], complete)
+    @property
+    def findings(self) -> Iterator[Risk]:  # type: ignore[override]
+        """Risks of the linear model but for those of its inputs and outputs, motions that grow or
+        are free, and such beyond the shapes."""
+        yield from (risk for risk in self.linear.risks if risk.name not in CHANNEL_RISKS)
+        yield from self.motion_risks()
+        yield from self._range_risks()
 
+    def _range_risks(self) -> Iterator[Risk]:
+        """Motions faster than those that the shapes of flexible bodies hold."""
+        model = self.linear.model
+        slowest = min(shape_limits(model).values(), default=np.inf)
+        fast = np.flatnonzero(self.omega > slowest)
+        if len(fast):
+            some = replace(self, eigenvalues=self.eigenvalues[fast], shapes=self.shapes[:, fast])
+            yield from motion_range_risks(model, some.omega, some.strain())
 
-def _from_potential(stiffness: Array) -> bool:
-    scale = np.abs(stiffness).max(initial=0)
-    return bool(np.abs(stiffness - stiffness.T).max(initial=0) <= _SYMMETRIC * scale)
+    def motion_risks(self) -> Iterator[Risk]:
+        """Motions that grow, and motions that nothing pushes back."""
+        growing = self.eigenvalues.real.max(initial=0)
+        if growing > 0:
+            k = int(self.eigenvalues.real.argmax())
+            moving = abbreviate_names(self.moving(k))
+            yield information(
+                "unstable", moving, f"unstable: a motion of {moving} grows with {growing:.4g} 1/s",
+                "small motions leave this state; choose a stable one",
+            )  # fmt: skip
+        free = np.flatnonzero(self.omega == 0)
+        if len(free):
+            moved = list(dict.fromkeys(name for k in free for name in self.moving(int(k))))
+            yield information(
+                "unrestrained", abbreviate_names(moved),
+                f"nothing pushes back {abbreviate_names(moved)}: motions of frequency 0",
+                "add a stiffness if they are not meant to move freely",
+            )  # fmt: skip
 
+    @cached_property
+    def frame(self) -> str:
+        """The frame of the frequencies, "fixed" or "rotating"; see `Linear.frame`."""
+        return frame_of(self.linear)
 
-def _symmetric(linear: Equations) -> tuple[Array, Array]:
-    stiffness, mass = (linear.K + linear.K.T) / 2, (linear.M + linear.M.T) / 2
-    try:
-        squares, shapes = eigh(stiffness, mass)
-    except np.linalg.LinAlgError:
-        raise _no_inertia(linear) from None
-    rounding = (_ROUNDING**2) * np.abs(squares).max(initial=0)
-    return np.where(np.abs(squares) <= rounding, 0.0, squares), shapes
+    @cached_property
+    def whirl(self) -> Array:
+        """(k,) sense of each motion about the axis of the fastest spin, as its frame sees it: 1
+        forward along circles, -1 backward, between these along ellipses, 0 in a plane."""
+        return whirl(self.linear, self.shapes)
 
+    @property
+    def omega(self) -> Array:
+        """(k,) |eigenvalue|, rad/s: of undamped motion its angular frequency."""
+        return np.abs(self.eigenvalues)
 
-def _general(linear: Equations, c: Array) -> Modes:
-    """The quadratic problem, made linear."""
-    n = len(linear)
-    zero, one = np.zeros((n, n)), np.eye(n)
-    a = np.block([[zero, one], [-linear.K, -c]])
-    b = np.block([[one, zero], [zero, linear.M]])
-    pairs: Any = eig(a, b)
-    values, vectors = pairs
-    if not np.isfinite(values).all():
-        raise _no_inertia(linear)
-    rounding = _ROUNDING * np.abs(values).max(initial=0)
-    values = np.where(np.abs(np.imag(values)) <= rounding, np.real(values), values)
-    values = np.where(np.abs(np.real(values)) <= rounding, 1j * np.imag(values), values)
-    kept = np.flatnonzero(np.imag(values) >= 0)
-    kept = kept[np.argsort(np.abs(values[kept]), kind="stable")]
-    shapes = vectors[:n, kept]
-    places = np.abs(shapes).argmax(axis=0)
-    shapes = shapes / shapes[places, np.arange(len(kept))]
-    return Modes(linear, values[kept].astype(np.complex128), shapes, True)
+    @property
+    def frequency(self) -> Array:
+        """(k,) frequency of the oscillation in Hz, 0 of what does not oscillate."""
+        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
+    @property
+    def damping(self) -> Array:
+        """(k,) in parts of the critical one; negative of what grows, 0 of what moves freely."""
+        omega = self.omega
+        rates = 0.0 - self.eigenvalues.real
+        return np.divide(rates, omega, out=np.zeros_like(omega), where=omega > 0)
 
-def _no_inertia(linear: Equations) -> NumericalFailure:
-    names = ", ".join(linear.coordinates[:3])
-    return NumericalFailure(
-        f"modes: the mass matrix of {names}, ... is not positive, so that some motion has no "
-        "frequency; give what these move inertia"
-    )
+    def first(self, count: int) -> Modes:
+        """The first of them."""
+        return replace(self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count])
+
+    @cached_property
+    def _units(self) -> Array:
+        """(k,) modal masses x* M x of the shapes."""
+        linear, x = self.linear, self.shapes
+        loops = linear.mechanism is not None
+        moved = linear.M @ x if loops else energy_shares.along(linear.pencil.mass, x)
+        return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
+
+    @cached_property
+    def _lengths(self) -> Array:
+        """(n,) what a unit of each coordinate counts beside others: m, of rad as a length."""
+        turns = [unit == "rad" for unit in self.linear.units]
+        return np.where(turns, scene_length(self.linear.model), 1.0)
+
+    @cached_property
+    def participation(self) -> NDArray[Any]:
+        """(k, disturbances): how much of each shape a unit of each disturbance excites, x* W over
+        the modal mass; of accelerations of the ground the participation factors, with their sign
+        turned."""
+        pushed = np.conj(self.shapes).T @ self.linear.W
+        return np.asarray(pushed / self._units[:, None])
+
+    @property
+    def effective_mass(self) -> Array:
+        """(k, disturbances) in kg for accelerations of the ground: |x* W|^2 over the modal mass.
+        Over all undamped modes of a scene it adds up to the mass that moves."""
+        return np.asarray(np.abs(self.participation) ** 2 * self._units[:, None])
+
+    def kinetic(self) -> dict[str, Array]:
+        """Body -> (k,): its part of the kinetic energy of each shape, x* M x; the rotors of a hinge
+        move with its outboard body."""
+        return energy_shares.kinetic(self.linear, self.shapes)
+
+    def strain(self) -> dict[str, Array]:
+        """Owner -> (k,): its part of the elastic energy of each shape: hinges with their laws,
+        flexible bodies, and "springs", all of them together, where there are any.  nan where a
+        shape strains nothing."""
+        return energy_shares.strain(self.linear, self.shapes)
+
+    def displaced(self, k: int, amplitude: float) -> Array:
+        """q (nq,) of the state moved by `amplitude` times the real part of shape k."""
+        return self.linear.displaced(finite_float("amplitude", amplitude) * np.real(self._shape(k)))
+
+    def _shape(self, k: int) -> NDArray[Any]:
+        if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or not 0 <= k < len(self):
+            raise SceneError(f"shape {k!r}: there are {len(self)}, counted from 0")
+        return self.shapes[:, k]
+
+    def moving(self, k: int) -> list[str]:
+        """Coordinates that move most in shape k, a tenth of the largest and more, largest first.
+
+        A radian counts as a length of the scene.
+        """
+        size = np.abs(self._shape(k)) * self._lengths
+        places = np.flatnonzero(size > 0.1 * size.max(initial=0))
+        order = places[np.argsort(-size[places], kind="stable")]
+        return [self.linear.coordinates[j] for j in order]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, for JSON; of shapes a row for each."""
+        return {
+            "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
+            "damping": self.damping.tolist(), "complete": self.complete,
+            "frame": self.frame, "whirl": self.whirl.tolist(),
+            "eigenvalues": [[x.real, x.imag] for x in self.eigenvalues.tolist()],
+            "coordinates": list(self.linear.coordinates), "units": list(self.linear.units),
+            "shapes": {"real": np.real(self.shapes).T.tolist(),
+                       "imag": np.imag(self.shapes).T.tolist()},
+            "kinetic": {name: row.tolist() for name, row in self.kinetic().items()},
+            "strain": {name: [None if np.isnan(x) else x for x in row.tolist()]
+                       for name, row in self.strain().items()},
+            **self.assessment(),
+        }  # fmt: skip
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        kinetic, strain = self.kinetic(), self.strain()
+        arrays: dict[str, Any] = {
+            "omega": ("mode", self.omega, {"units": "rad/s"}),
+            "frequency": ("mode", self.frequency, {"units": "Hz"}),
+            "damping": ("mode", self.damping),
+            "growth": ("mode", self.eigenvalues.real, {"units": "1/s"}),
+            "whirl": ("mode", self.whirl),
+            "shape": (("coordinate", "mode"), np.real(self.shapes)),
+            "shape_imaginary": (("coordinate", "mode"), np.imag(self.shapes)),
+            "kinetic": (("body", "mode"), np.array(list(kinetic.values()))),
+            "strain": (("owner", "mode"), np.array(list(strain.values()))),
+        }
+        names = {
+            "mode": np.arange(1, len(self) + 1), "coordinate": list(self.linear.coordinates),
+            "body": list(kinetic), "owner": list(strain),
+        }  # fmt: skip
+        about = {"complete": str(self.complete), "frame": self.frame}
+        return file_formats.xarray().Dataset(arrays, names, about)
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each motion."""
+        parts = [np.real] if self.undamped else [np.real, np.imag]
+        named = [name + " imaginary" * (part is np.imag) for part in parts
+                 for name in self.linear.coordinates]  # fmt: skip
+        whose = ("kinetic energy", self.kinetic()), ("strain energy", self.strain())
+        shared = [f"{kind} of {name}" for kind, part in whose for name in part]
+        yield "mode", "omega [rad/s]", "frequency [Hz]", "damping", "growth [1/s]", *named, *shared
+        about = self.omega, self.frequency, self.damping, self.eigenvalues.real
+        for k, shape in enumerate(self.shapes.T):
+            numbers = [*(x[k] for x in about), *(x for part in parts for x in part(shape)),
+                       *(row[k] for _, part in whose for row in part.values())]  # fmt: skip
+            yield str(k + 1), *(repr(float(x)) for x in numbers)
+
+    def save(self, path: str | Path) -> Path:
+        """Frequencies, damping, shapes and shares of energy: .nc (extra io) or .csv, a row for each
+        motion.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return file_formats.save(path, self.to_dataset, self._rows())
+
+    def plot(self, path: str | Path | None = None, which: Sequence[int] | None = None) -> Any:
+        """`matplotlib.figure.Figure`: the scene at rest and displaced by the real part of each
+        shape of `which`, counted from 0, the first six unless given, in the coordinate plane that
+        shows most of it; written to `path` where it is given.
+
+        Raises SceneError for a shape that is not there, EnvironmentFailure without the extra
+        `plot`.
+        """
+        from .plots.mode_shapes import shapes
+
+        which = self._which(which)
+        return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
+
+    def _which(self, which: Sequence[int] | None) -> Sequence[int]:
+        """The shapes that are asked for, or the first.  SceneError for one that is not there."""
+        if which is None:
+            return range(min(_PANELS, len(self)))
+        if isinstance(which, str) or not isinstance(which, Sequence) or not 0 < len(which) <= 12:
+            raise SceneError(
+                f"which = {which!r}: expected a list of 1 to 12 shapes, such as [0, 2]"
+            )
+        for k in which:
+            self._shape(k)
+        return which
+
+    def view(
+        self,
+        path: str | Path | None = None,
+        *,
+        which: Sequence[int] | None = None,
+        amplitude: float | None = None,
+        title: str = "Natural motions",
+    ) -> SceneView:
+        """The motions of `which`, counted from 0, as they move: one page on which each can be
+        chosen, and with `path` written there, see `Result.view`.  Unless given they are the first
+        six but for those of frequency 0.
+
+        The point that moves most moves by `amplitude`, 0.08 unless given, times the size of the
+        scene, and nothing turns by more than 0.8 rad; loops stay closed.  SceneError for a shape
+        that is not there, EnvironmentFailure without the extras.
+        """
+        from .plots.mode_animation import view
+
+        if amplitude is not None and not 0 < finite_float("amplitude", amplitude) <= 1:
+            raise SceneError(f"amplitude = {amplitude:g}: expected a part of the size, 0 to 1")
+        if which is None:
+            which = np.flatnonzero(self.omega > 0)[:_PANELS].tolist() or None
+        which = self._which(which)
+        made = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
+        if path is not None:
+            made.save(path)
+        return made
+
+    def plot_eigenvalues(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`: eigenvalues by growth in 1/s and angular frequency in rad/s,
+        with lines of equal damping; written to `path` where it is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .plots.mode_shapes import eigenvalues
+
+        return eigenvalues(self.eigenvalues, path)
+
+    @property
+    def growing(self) -> NDArray[np.bool_]:
+        """(k,) which of them grow by themselves."""
+        return self.eigenvalues.real > 0
+
+    @property
+    def undamped(self) -> bool:
+        """Whether there is neither damping nor gyroscopic load in them."""
+        return not np.iscomplexobj(self.shapes)

@@ -7,16 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from .channels import Channel
-from .equations import Equations
-from .output.outputs import Rows
+from .input_channels import Channel
+from .linear_equations import LinearEquations
+from .outputs.linear_outputs import Rows
 
 
-class StateSpace(Equations):
+class StateSpace(LinearEquations):
     """d/dt z = A z + B v + B_disturbances w of z = (x, x'), and d, d' of the drives behind them
-    whose accelerations are inputs; see `Equations`."""
+    whose accelerations are inputs; see `LinearEquations`."""
 
     @property
     def states(self) -> tuple[str, ...]:

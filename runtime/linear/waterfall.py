@@ -11,21 +11,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.risk import Assessed, DeferredRisks, Risk
+from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
 
-from ..guard.answers import merge_over_values
-from . import files
-from .motions import Complex
-from .response import frequency_response
+from ..risk_checks.answers import merge_over_values
+from . import file_formats
+from .frequency_response import frequency_response
+from .modes import Complex
 
 if TYPE_CHECKING:
-    from .equations import Equations
+    from .linear_equations import LinearEquations
 
 
 @dataclass(frozen=True, eq=False)
-class Waterfall(Assessed):
+class Waterfall(AssessedAnswer):
     """Amplitudes `values` (m, k) of one output under one input, complex: over a parameter (m,) and
     omega (k,) in rad/s."""
 
@@ -42,7 +42,7 @@ class Waterfall(Assessed):
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from .pictures.curves import waterfall
+        from .plots.bode_and_locus import waterfall
 
         frequency, up = self.omega / (2 * np.pi), np.argsort(self.points)
         return waterfall(frequency, self.points[up], self.values[up], self.parameter, path)
@@ -57,7 +57,7 @@ class Waterfall(Assessed):
             "value": self.points, "omega": ("omega", self.omega, {"units": "rad/s"}),
         }  # fmt: skip
         about = {"parameter": self.parameter, "input": self.input, "output": self.output}
-        return files.xarray().Dataset(arrays, coords, about)
+        return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """A row for each value of the parameter and each frequency."""
@@ -72,11 +72,11 @@ class Waterfall(Assessed):
 
         Raises SceneError for another ending, EnvironmentFailure without the extra.
         """
-        return files.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_dataset, self._rows())
 
 
 def waterfall(
-    at: Callable[[float], Equations],
+    at: Callable[[float], LinearEquations],
     parameter: str,
     points: Array,
     omega: ArrayLike,

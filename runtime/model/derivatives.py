@@ -1,7 +1,8 @@
 """Exact derivatives of the accelerations, without differences.
 
 Where there is code for the linear equations of a scene about a state, they are all found at once:
-M da + C du + K dphi + r_t dt = d efforts.  Else by forward mode (`mstmm.ir.tangent`) on the fused
+M da + C du + K dphi + r_t dt = d efforts.  Else by forward mode (`mstmm.ir.differentiation`) on
+the fused
 kernel: one run of a tangent kernel gives the derivative along one direction.
 
 Coordinates are varied by tangent increments dphi, one for each speed: dq = N(q) dphi, where
@@ -18,17 +19,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arguments import short
-from mstmm.arrays import Array, batch, into
+from mstmm.argument_validation import abbreviate
+from mstmm.array_validation import Array, batch, copy_to
 from mstmm.errors import NumericalFailure, SceneError
 
-from ..engine.live import LiveInputs
-from ..engine.tangents import Tangents
-from ..pack.slopes import slopes
-from ..pack.structure import structure_of
+from ..engine.live_inputs import LiveInputs
+from ..engine.tangent_kernels import TangentKernels
+from ..packing.fused_structure import structure_of
+from ..packing.parameter_derivatives import slopes
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
 
 
 #: What code of linear equations saves a state beside directions one by one, in what it saves where
@@ -76,20 +77,21 @@ class Derivatives:
         """`out` with these numbers.  SceneError unless it is of the same shapes and parameters."""
         if not isinstance(out, Derivatives) or list(out.parameters) != list(self.parameters):
             raise SceneError(
-                f"out = {short(out)}: expected what an earlier call of derivatives gave, with the "
+                f"out = {abbreviate(out)}: expected what an earlier call of derivatives gave, "
+                f"with the "
                 "same parameters"
             )
         for name in _FOUND:
-            into(getattr(out, name), getattr(self, name))
+            copy_to(getattr(out, name), getattr(self, name))
         for name, numbers in self.parameters.items():
-            into(out.parameters[name], numbers)
+            copy_to(out.parameters[name], numbers)
         return out
 
 
 class Differentiation:
     """Derivatives of one model with one set of parameters; kernels are made when asked for."""
 
-    def __init__(self, model: Compiled, names: Sequence[str]) -> None:
+    def __init__(self, model: CompiledScene, names: Sequence[str]) -> None:
         self._model = model
         self.names = tuple(names)
         known = model.known or {}
@@ -101,7 +103,7 @@ class Differentiation:
             structure, self.p = structure_of(packed.system, known, floors=packed.floors)
             self.slopes = np.zeros((len(self.p), 0))
         self._live = LiveInputs(model.packed.system, structure.inputs)
-        self.tangents = Tangents(model.fusion, structure, bool(names))
+        self.tangents = TangentKernels(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
         #: Without drives all speeds are free, and time acts at coordinates that stay.
         self._undriven = not names and not model.packed.system.driven
@@ -240,7 +242,7 @@ class Differentiation:
         return rate_q, rate_u
 
 
-def _refuse(model: Compiled) -> None:
+def _refuse(model: CompiledScene) -> None:
     """SceneError for a scene whose accelerations are no single smooth function."""
     packed = model.packed
     if packed.releases:

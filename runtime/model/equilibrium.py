@@ -7,22 +7,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
-from mstmm.printable import abbreviate
-from mstmm.risk import Assessed, DeferredRisks, Risk
+from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.safe_text import abbreviate_names
 
-from ..engine.calls import Probe
-from ..engine.sizes import scene_length, speed_sizes
+from ..engine.characteristic_scales import scene_length, speed_scales
+from ..engine.engine_calls import Probe
 from ..engine.statics.rest import Undetermined, Unsettled
-from ..engine.statics.rest_by_sweep import MOST
-from ..guard.answers import find_state_risks
-from ..run.system import SceneSystem
+from ..engine.statics.rest_by_sweep import MAX_STEPS
+from ..risk_checks.answers import find_state_risks
+from ..run.scene_system import SceneSystem
 from .equilibrium_search import DECIDING, EquilibriumSearch, Progress
-from .turns import without_turns
+from .full_turns import without_turns
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
 
 
 #: Coordinates that a message lists.
@@ -36,7 +36,7 @@ _STILL = 5e-2
 _AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class Equilibrium(Assessed, np.ndarray[Any, np.dtype[np.float64]]):
+class Equilibrium(AssessedAnswer, np.ndarray[Any, np.dtype[np.float64]]):
     """q (nq,) of an equilibrium, an array like any other, and how far it can be trusted.
 
     `residuals` are the efforts in N or N*m (of modal coordinates N, or N*m for twist) still missing
@@ -54,11 +54,11 @@ class Equilibrium(Assessed, np.ndarray[Any, np.dtype[np.float64]]):
 
 
 def equilibrium(
-    model: Compiled,
+    model: CompiledScene,
     q: Array,
     t: float,
     tolerance: float,
-    max_steps: int = MOST,
+    max_steps: int = MAX_STEPS,
     progress: Progress | None = None,
 ) -> Equilibrium:
     """q at which the free coordinates need no effort at rest; see `Model.equilibrium`."""
@@ -91,19 +91,19 @@ def equilibrium(
 
 
 def _find_risks(
-    model: Compiled, t: float, found: Equilibrium, spins: tuple[str, ...]
+    model: CompiledScene, t: float, found: Equilibrium, spins: tuple[str, ...]
 ) -> Iterator[Risk]:
     """Risks of the state, coordinates with which it is left once it is disturbed, and those of
     bodies that may spin."""
     yield from find_state_risks(model, t, np.asarray(found), np.zeros(model.nu))
     if found.unstable:
-        names = abbreviate(found.unstable)
+        names = abbreviate_names(found.unstable)
         yield Risk(
             "unstable", names, f"unstable: once disturbed the state is left along {names}",
             "take another start, q=..., if a stable equilibrium is meant", doubt=False,
         )  # fmt: skip
     if spins:
-        names = abbreviate(spins)
+        names = abbreviate_names(spins)
         yield Risk(
             "free-spin", names,
             f"bodies may spin about axes through their mass centre and all their ends: nothing "
@@ -115,31 +115,32 @@ def _find_risks(
 
 def _undetermined(names: list[str]) -> NumericalFailure:
     return NumericalFailure(
-        f"the equilibrium is undetermined along {abbreviate(names)}: nothing pushes these "
+        f"the equilibrium is undetermined along {abbreviate_names(names)}: nothing pushes these "
         "coordinates back; fix them, drive them or add a stiffness"
     )
 
 
 def _unbalanced(
-    model: Compiled, q: Array, motion: Array, loads: Array, states: int
+    model: CompiledScene, q: Array, motion: Array, loads: Array, states: int
 ) -> NumericalFailure:
     """The error for loads (nu,) that do work along a motion (nu,) which nothing resists."""
     work = np.abs(motion * loads)
     order = np.argsort(-work, kind="stable")
     concerned = [int(j) for j in order if work[j] > _MOVES * work.max()]
     named = [f"{loads[j]:.3g} along {model.layout.u_name(j)}" for j in concerned]
-    moving = abbreviate(_moving(model, q, [motion]))
+    moving = abbreviate_names(_moving(model, q, [motion]))
     return NumericalFailure(
-        f"no equilibrium exists: unbalanced load of {abbreviate(named)} (N or N*m); it does the "
+        f"no equilibrium exists: unbalanced load of {abbreviate_names(named)} (N or N*m); it does "
+        f"the "
         f"same work along {moving} at all {states} states examined; add a stiffness or a drive "
         "there, remove the load, or linearise about a given state, q = ..."
     )
 
 
-def _moving(model: Compiled, q: Array, motions: list[Array]) -> tuple[str, ...]:
+def _moving(model: CompiledScene, q: Array, motions: list[Array]) -> tuple[str, ...]:
     """Names of the speeds that move in some motions (nu,) at q; of mechanisms, unless they are
     large, of those that decide all others."""
-    moving, sizes = np.zeros(model.nu, dtype=bool), speed_sizes(model)
+    moving, sizes = np.zeros(model.nu, dtype=bool), speed_scales(model)
     places = np.arange(model.nu)
     if motions and model.closed is not None and model.closed.loops.mobility <= DECIDING:
         assert model.freedom is not None
@@ -150,7 +151,7 @@ def _moving(model: Compiled, q: Array, motions: list[Array]) -> tuple[str, ...]:
     return tuple(model.layout.u_name(int(j)) for j in np.flatnonzero(moving))
 
 
-def _spins(model: Compiled, q: Array, t: float, motions: list[Array]) -> tuple[str, ...]:
+def _spins(model: CompiledScene, q: Array, t: float, motions: list[Array]) -> tuple[str, ...]:
     """Names of the speeds of motions (nu,) that nothing pushes, in which bodies spin and none of
     their ends or mass centres moves; a NumericalFailure for any other motion."""
     engine, packed, count = model.looped, model.packed, len(motions)
@@ -172,7 +173,7 @@ def _spins(model: Compiled, q: Array, t: float, motions: list[Array]) -> tuple[s
     return _moving(model, q, motions)
 
 
-def _points(model: Compiled, name: str, body: Any) -> Iterator[tuple[float, ...]]:
+def _points(model: CompiledScene, name: str, body: Any) -> Iterator[tuple[float, ...]]:
     """The hinge, the mass centre and the ends of a body, internal axes."""
     yield 0.0, 0.0, 0.0
     packed = model.packed
@@ -182,16 +183,16 @@ def _points(model: Compiled, name: str, body: Any) -> Iterator[tuple[float, ...]
         yield packed.end(f"{name}.{end}")[2]
 
 
-def _with_drives(model: Compiled, q: Array, t: float) -> Array:
+def _with_drives(model: CompiledScene, q: Array, t: float) -> Array:
     """q with driven coordinates where their drives have them."""
     return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
 
 
-def _largest(model: Compiled, failure: Unsettled) -> str:
+def _largest(model: CompiledScene, failure: Unsettled) -> str:
     """The largest efforts by name, counted by their work over a motion of order one."""
     problem, residual = failure.problem, failure.residual
     places = range(model.nu) if problem is None else problem.places
-    sizes = speed_sizes(model)[list(places)]
+    sizes = speed_scales(model)[list(places)]
     order = np.argsort(-np.abs(residual * sizes))[:_LISTED]
     names = [model.layout.u_name(places[k]) for k in order]
     listed = [f"{residual[k]:.3g} along {name}" for k, name in zip(order, names, strict=True)]

@@ -10,26 +10,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
-from ..engine.engine import Engine
-from ..engine.loops.calls import LoopCalls
-from ..engine.loops.freedom import Freedom
-from ..engine.sizes import scene_length, speed_sizes
-from ..engine.statics.rest import Rest, Unsettled, approached, leaving
+from ..engine.characteristic_scales import scene_length, speed_scales
+from ..engine.looped_engine import LoopedEngine
+from ..engine.loops.independent_speeds import IndependentSpeeds
+from ..engine.loops.loop_calls import LoopCalls
+from ..engine.statics.rest import Rest, Unsettled, approached, unstable_coordinates
 from ..engine.statics.rest_by_sweep import RestBySweep
 from ..engine.statics.shifted_stiffness import ShiftedStiffness
 from ..engine.statics.stability import Stability, find_stability
 from ..engine.statics.unbalanced import FARTHEST, find_unbalanced_motion
-from ..engine.tangent import Tangent
-from ..pack.loops.variants import with_rotors
-from ..pack.pack import packed_system
-from ..run.at_rest.mechanism import Mechanism
-from ..run.system import SceneSystem
+from ..engine.tangent_matrix import TangentMatrix
+from ..packing.loops.system_variants import with_rotors
+from ..packing.scene_packing import packed_system
+from ..run.scene_system import SceneSystem
+from ..run.static_start.closed_states import ClosedStates
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
 
 #: Free speeds of trees, and of mechanisms, up to which a stiffness matrix by differences is made
 #: where the sweep finds no rest.
@@ -56,10 +56,10 @@ Progress = Callable[[int, float], None]
 class _Sweeps:
     """Searches beside rotors of one weight, in parts of the scene's, on all hinges."""
 
-    def __init__(self, model: Compiled, t: float, weight: float) -> None:
+    def __init__(self, model: CompiledScene, t: float, weight: float) -> None:
         engine = _with_rotors(model, weight)
         self._scene = SceneSystem(engine, with_power=False)  # lays out tapes that need room
-        self.stiffness = ShiftedStiffness(Tangent(engine), t, speed_sizes(model))
+        self.stiffness = ShiftedStiffness(TangentMatrix(engine), t, speed_scales(model))
         gravity = float(np.linalg.norm(model.scene.gravity))
         self._load = _mass(model) * gravity * scene_length(model)
 
@@ -82,7 +82,7 @@ class EquilibriumSearch:
     """The way of one model to rest at time t: by sweeps, and of few coordinates, where those find
     none, by a stiffness matrix of differences and with the load in parts."""
 
-    def __init__(self, model: Compiled, t: float) -> None:
+    def __init__(self, model: CompiledScene, t: float) -> None:
         self._model, self._t = model, t
         few = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
         self._is_driven = few == 0  # drives and loops alone say where everything is
@@ -194,7 +194,9 @@ class EquilibriumSearch:
         found = approached(problem, q, tolerance)
         self._by_differences = problem = problem.at(found)
         units = np.eye(model.nu)
-        return found, Stability([units[problem.places[k]] for k in leaving(problem, found)])
+        return found, Stability(
+            [units[problem.places[k]] for k in unstable_coordinates(problem, found)]
+        )
 
     def find_unbalanced(self, q: Array) -> tuple[Array, Array, int] | None:
         """A motion (nu,) along which loads do the same work at every state drawn, the loads (nu,)
@@ -272,23 +274,23 @@ def _counted(progress: Progress | None) -> Progress | None:
     return None if progress is None else lambda _, length: progress(next(steps), length)
 
 
-def _mass(model: Compiled) -> float:
+def _mass(model: CompiledScene) -> float:
     """Of all bodies that have one of their own, kg."""
     bodies = model.scene.bodies.by_name.values()
     return float(sum(body.mass for body in bodies if hasattr(body, "mass")))
 
 
-def _with_rotors(model: Compiled, weight: float) -> Engine:
+def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
     """The engine of the model with rotors on all hinges, as heavy as so many scenes."""
     packed = model.packed
-    rotors = weight * (_mass(model) or 1.0) * (scene_length(model) / speed_sizes(model)) ** 2
-    engine = Engine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
+    rotors = weight * (_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
+    engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
     if model.closed is not None:
         LoopCalls(engine, model.closed.start[0])  # judges its rows
     return engine
 
 
-def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
+def _problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
     engine, still = model.looped, np.zeros(model.nu)
     memory, quaternions = engine.start_memory(), model.layout.quaternions
     straight = _straight_places(model, free)
@@ -309,13 +311,13 @@ def _problem(model: Compiled, t: float, free: list[int]) -> Rest:
             result[first : first + 4] = unit / np.linalg.norm(unit)
         return np.asarray(result)
 
-    return Rest(needed, moved, speed_sizes(model)[free], tuple(free))
+    return Rest(needed, moved, speed_scales(model)[free], tuple(free))
 
 
-def _of_mechanism(model: Compiled, freedom: Freedom, q: Array, t: float) -> Rest:
+def _of_mechanism(model: CompiledScene, freedom: IndependentSpeeds, q: Array, t: float) -> Rest:
     """The way of a closed q to rest along the independent speeds there: what the tree needs along
     the motions that the loops leave, which the loads of loops do not see."""
-    engine, still, closed = model.looped, np.zeros(model.nu), Mechanism(model, freedom, t)
+    engine, still, closed = model.looped, np.zeros(model.nu), ClosedStates(model, freedom, t)
 
     def along(places: tuple[int, ...]) -> Rest:
         sizes = closed.sizes[list(places)]
@@ -340,7 +342,7 @@ def _of_mechanism(model: Compiled, freedom: Freedom, q: Array, t: float) -> Rest
     return along(freedom.chosen(q))
 
 
-def _straight_places(model: Compiled, free: list[int]) -> NDArray[np.int64] | None:
+def _straight_places(model: CompiledScene, free: list[int]) -> NDArray[np.int64] | None:
     """Places in q whose rates are the free speeds; None where a hinge has others."""
     places = np.zeros(model.nu, dtype=np.int64)
     for slots in model.layout.hinges.values():

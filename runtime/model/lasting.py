@@ -8,21 +8,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import DeferredRisks, Risk, advice
+from mstmm.risk import DeferredRisks, Risk, information
 
-from ..linear.judged import departure_risk
 from ..linear.operating_point.departure import find_departure
 from ..linear.operating_point.later import LaterStates
-from ..run.system import SceneSystem
+from ..linear.validity import departure_risk
+from ..run.scene_system import SceneSystem
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
-    from ..linear.linear import Linear
+    from ..engine.compiled_scene import CompiledScene
+    from ..linear.linear_model import Linear
     from .equilibrium import Equilibrium
 
 
 def check_lasting(
-    model: Compiled, found: Equilibrium, t: float, linearise: Callable[[], Linear]
+    model: CompiledScene, found: Equilibrium, t: float, linearise: Callable[[], Linear]
 ) -> Equilibrium:
     """The equilibrium of time t (s), with a risk where it is that of a moment; `linearise` gives
     the linear model about it.
@@ -45,7 +45,7 @@ def check_lasting(
     return found
 
 
-def _drives_move(model: Compiled, found: Equilibrium, t: float) -> bool:
+def _drives_move(model: CompiledScene, found: Equilibrium, t: float) -> bool:
     """Whether a drive has a speed or an acceleration."""
     system, engine = model.packed.system, model.looped
     whole = SceneSystem(engine).start(t, np.asarray(found), np.zeros(model.nu))
@@ -63,7 +63,7 @@ def _risks(t: float, linearise: Callable[[], Linear]) -> Iterator[Risk]:
         later = LaterStates(linear)
         leaving = find_departure(linear, later)
     except (SceneError, NumericalFailure) as failure:
-        yield advice(
+        yield information(
             "unexamined", "the state", f"not examined for how long it lasts: {failure}",
             "simulate from this state",
         )  # fmt: skip

@@ -11,29 +11,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arguments import yes_or_no
-from mstmm.arrays import Array, batch, one, pair, real, whole
+from mstmm.argument_validation import require_bool
+from mstmm.array_validation import Array, batch, finite_float, integer, single_state, split_state
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
-from mstmm.markup import Displayed, table
+from mstmm.notebook_html import NotebookDisplay, table
 from mstmm.risk import Risk
 
-from ..engine.given import GivenInput
-from ..integrate.settings import Settings, checked, times_of
-from .linearised import Linearised
+from ..engine.input_values import InputValue
+from ..integrate.settings import Settings, to_output_times, validate
+from .linear_analysis import LinearAnalysis
 
 if TYPE_CHECKING:
     from ..engine.loops.branches import Branch
-    from ..engine.loops.closed import Loops
-    from ..result.batch import Batch
+    from ..engine.loops.loop_analysis import LoopAnalysis
+    from ..result.batch_result import BatchResult
     from ..result.result import Result
-    from ..run.batch.inputs import BatchInput
-    from .assemble import Assembly
+    from ..run.batch.batch_inputs import BatchInput
+    from .assembly import Assembly
     from .equilibrium import Equilibrium
     from .session import Session
 
 
-class Model(Linearised, Displayed):
+class Model(LinearAnalysis, NotebookDisplay):
     """A scene ready to compute.  Made by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
@@ -60,17 +60,17 @@ class Model(Linearised, Displayed):
     @cached_property
     def _start(self) -> tuple[Array, Array]:
         """What `initial_state` gives, computed once: a scene does not change."""
-        from ..run.start import initial_state
+        from ..run.start_state import initial_state
 
         return initial_state(self)
 
     @property
-    def loops(self) -> Loops:
+    def loops(self) -> LoopAnalysis:
         """What closes in the scene: cut hinges, rows and those that repeat others, mobility."""
-        from ..engine.loops.closed import Loops
+        from ..engine.loops.loop_analysis import LoopAnalysis
 
         if self.closed is None:
-            return Loops()
+            return LoopAnalysis()
         return replace(self.closed.loops, decided_by=self._independent, found_by=self._branches)
 
     def _branches(self) -> tuple[Branch, ...]:
@@ -105,13 +105,15 @@ class Model(Linearised, Displayed):
         Raises SceneError for a hinge or branch that there is not, for loops that do not close near
         the state, for a branch that ends before, and for speeds that contradict each other.
         """
-        from .assemble import assemble
+        from .assembly import assemble
 
         start, only = self.initial_state(), "assemble takes one state; see assemble_path"
-        wish_q = start[0] if q is None else one("q", q, self.nq, only)
-        wish_u = start[1] if u is None else one("u", u, self.nu, only)
+        wish_q = start[0] if q is None else single_state("q", q, self.nq, only)
+        wish_u = start[1] if u is None else single_state("u", u, self.nu, only)
         fast = self.closed.fast if u is None and self.closed is not None else None
-        return assemble(self, wish_q, wish_u, hold, fast, real("t", t, "a time in s"), branch)
+        return assemble(
+            self, wish_q, wish_u, hold, fast, finite_float("t", t, "a time in s"), branch
+        )
 
     def assemble_path(self, q: ArrayLike, hold: Sequence[str], branch: int = 0) -> Array:
         """Closed states (n, nq) with the coordinates of the hinges named in `hold` as in the rows
@@ -120,14 +122,14 @@ class Model(Linearised, Displayed):
 
         Raises SceneError as `assemble` does; OpenLoop where the branch ends.
         """
-        from .assemble import assemble_path
+        from .assembly import assemble_path
 
         rows = batch(("q", q, self.nq))[1][0]
         return assemble_path(self, rows, hold, branch)
 
     def refuse_undetermined_start(self) -> None:
         """SceneError naming the hinges if the masses leave a motion of the start undetermined."""
-        from .undetermined import refuse_undetermined_start
+        from .undetermined_start import refuse_undetermined_start
 
         refuse_undetermined_start(self, *self.initial_state())
 
@@ -135,7 +137,7 @@ class Model(Linearised, Displayed):
         """SceneError for the first output of the scene of a quantity that results do not have, and
         for what controllers cannot measure."""
         if self.scene.output or self.scene.controller:
-            from ..result.outputs import quantity_of
+            from ..result.scene_outputs import quantity_of
 
             start = self.simulate(0.0, "dop853")
             for output in self.scene.output:
@@ -171,9 +173,9 @@ class Model(Linearised, Displayed):
         from .lasting import check_lasting
 
         instead = "call equilibrium for each of several"
-        start = self.initial_state()[0] if q is None else one("q", q, self.nq, instead)
-        t, tolerance = real("t", t, "a time in s"), real("tolerance", tolerance)
-        most = whole("max_steps", max_steps, 1, "a number of steps from 1 on")
+        start = self.initial_state()[0] if q is None else single_state("q", q, self.nq, instead)
+        t, tolerance = finite_float("t", t, "a time in s"), finite_float("tolerance", tolerance)
+        most = integer("max_steps", max_steps, 1, "a number of steps from 1 on")
         found = equilibrium(self, start, t, tolerance, most, progress)
         linearise = partial(self.linearize, np.asarray(found), None, t, inputs=(), disturbances=())
         return check_lasting(self, found, t, linearise)
@@ -191,7 +193,7 @@ class Model(Linearised, Displayed):
         error_of: str | Sequence[str] = (),
         t_start: float = 0.0,
         initial: tuple[ArrayLike, ArrayLike] | None = None,
-        inputs: Mapping[str, GivenInput] | None = None,
+        inputs: Mapping[str, InputValue] | None = None,
         max_step: float = 0.0,
         max_steps: int = 0,
         radius: float | None = None,
@@ -252,30 +254,33 @@ class Model(Linearised, Displayed):
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
         Raises SceneError for settings that make no sense, RiskRefused where `on_risk` asks for it.
         """
-        from ..guard.on_risk import ended, started
-        from .results import simulate
-        from .wanted.asked import Control, asked
+        from ..risk_checks.risk_policy import apply_policy, check_start
+        from .run_results import simulate
+        from .target_error.error_request import Control, parse_error_request
 
         model = self if inputs is None else self.with_inputs(inputs)
-        certify, resume = yes_or_no("certify", certify), yes_or_no("resume", resume)
+        certify, resume = require_bool("certify", certify), require_bool("resume", resume)
         given = Control(method, step, rtol, atol)
-        wanted = asked(error, error_of, given, checkpoint is not None or resume)
+        wanted = parse_error_request(error, error_of, given, checkpoint is not None or resume)
         method, rtol, atol = given.filled()
-        settings = checked(
+        settings = validate(
             Settings(
-                t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step,
+                t_end, t_start, method, step, rtol, atol, to_output_times(output_times), max_step,
                 max_steps, radius=radius, scheme=scheme, iterations=iterations,
                 tangent=tangent,
             )
         )  # fmt: skip
-        q, u = model.initial_state() if initial is None else pair("initial", initial)
+        q, u = model.initial_state() if initial is None else split_state("initial", initial)
         instead = "simulate_batch takes many"
-        q, u = one("initial q", q, self.nq, instead), one("initial u", u, self.nu, instead)
-        seen = started(model, settings, q, u, on_risk)
+        q, u = (
+            single_state("initial q", q, self.nq, instead),
+            single_state("initial u", u, self.nu, instead),
+        )
+        seen = check_start(model, settings, q, u, on_risk)
         if wanted is not None:
-            from .wanted import search
+            from .target_error import tolerance_search
 
-            result = search.simulate(
+            result = tolerance_search.simulate(
                 model, settings, wanted, q, u, seen=seen, certify=certify, progress=progress
             )
         else:
@@ -283,7 +288,7 @@ class Model(Linearised, Displayed):
                 model, settings, q, u, seen=seen, certify=certify, progress=progress,
                 checkpoint=checkpoint, resume=resume, named=given.method is not None,
             )  # fmt: skip
-        return ended(result, on_risk)
+        return apply_policy(result, on_risk)
 
     def session(
         self,
@@ -310,16 +315,16 @@ class Model(Linearised, Displayed):
         """
         from .session import Session
 
-        at = real("t", t, "a time in s")
+        at = finite_float("t", t, "a time in s")
         given = METHOD if method is None else method
         tolerances = RTOL if rtol is None else rtol, ATOL if atol is None else atol
-        settings = checked(
+        settings = validate(
             Settings(at, at, given, step, *tolerances, (), max_step, radius=radius, tangent=tangent)
         )
         start, instead = self.initial_state(), "make a session for each of several"
         state = (
-            start[0] if q is None else one("q", q, self.nq, instead),
-            start[1] if u is None else one("u", u, self.nu, instead),
+            start[0] if q is None else single_state("q", q, self.nq, instead),
+            start[1] if u is None else single_state("u", u, self.nu, instead),
         )
         return Session(self, settings, *state, self._step_risks(settings, *state))
 
@@ -356,7 +361,7 @@ class Model(Linearised, Displayed):
         radius: float | None = None,
         tangent: str = "auto",
         threads: int | None = None,
-    ) -> Batch:
+    ) -> BatchResult:
         """Integrate n independent trajectories to `t_end` (s).
 
         Args:
@@ -377,18 +382,27 @@ class Model(Linearised, Displayed):
 
         Raises SceneError for settings, shapes or parameters that make no sense.
         """
-        from ..result.batch import Batch
-        from ..run.batch.batch import prepared, simulate_batch
+        from ..result.batch_result import BatchResult
+        from ..run.batch.batch_run import prepare_batch, simulate_batch
 
         settings = Settings(
-            t_end, t_start, method, step, rtol, atol, times_of(output_times), max_step, max_steps,
-            radius=radius, tangent=tangent,
-        )  # fmt: skip
-        settings, q, u = prepared(self, settings, initial_states)
+            t_end,
+            t_start,
+            method,
+            step,
+            rtol,
+            atol,
+            to_output_times(output_times),
+            max_step,
+            max_steps,
+            radius=radius,
+            tangent=tangent,
+        )
+        settings, q, u = prepare_batch(self, settings, initial_states)
         found = simulate_batch(
             self, settings, q, u, {} if parameters is None else parameters, inputs, threads
         )
-        return Batch(**vars(found))
+        return BatchResult(**vars(found))
 
 
 __all__ = ["Model", "NumericalFailure"]

@@ -10,29 +10,29 @@ from typing import TYPE_CHECKING, Any, Never, Self
 
 import numpy as np
 
-from mstmm.arrays import Array, by_name, real
+from mstmm.array_validation import Array, finite_float, mapping_by_name
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import Risk, sentences
-from mstmm.scene.rules.messages import near
+from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ..breaks.acting import acting
-from ..engine.engine import Engine
-from ..engine.renewed import with_held, with_values
-from ..integrate.loop import Run, Samples, Status
+from ..discontinuities.active_expressions import active_expressions
+from ..engine.input_update import with_held_inputs, with_input_values
+from ..engine.looped_engine import LoopedEngine
+from ..integrate.c_loop import Integrator, Samples, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO
 from ..result.factory import result_of
-from ..run import classical, second_opinion
-from ..run.endings import message_of
+from ..run import classical_run, external_integrators
 from ..run.engine_choice import for_many
-from ..run.measured import MeasuredOutputs, refuse_one_way
-from ..run.notes import unseen
-from ..run.simulate import SLICE, make_run, settled, settles, split
-from ..run.stability import check_step
-from ..run.system import SceneSystem
+from ..run.integration_run import SLICE, make_run, project_samples, settles, split
+from ..run.measured_quantities import MeasuredOutputs, refuse_one_way
+from ..run.run_notes import unseen
+from ..run.scene_system import SceneSystem
+from ..run.step_stability import check_step
+from ..run.stop_messages import message_of
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
     from ..result.result import Result
 
 #: Rows for samples, which only events leave and nobody reads.
@@ -58,22 +58,27 @@ class Session:
     """
 
     def __init__(
-        self, model: Compiled, settings: Settings, q: Array, u: Array, risks: tuple[Risk, ...] = ()
+        self,
+        model: CompiledScene,
+        settings: Settings,
+        q: Array,
+        u: Array,
+        risks: tuple[Risk, ...] = (),
     ) -> None:
         refuse_method(settings)
         refuse_one_way(model.packed, "a session")
         self.model, self.settings, self._risks = model, settings, risks
         self._names = settable(model)
-        self._packed = with_held(model.packed, self._names, settings.t_start)
+        self._packed = with_held_inputs(model.packed, self._names, settings.t_start)
         self._code = for_many(model, settings)
-        self._outputs: MeasuredOutputs | None = MeasuredOutputs(Engine(self._packed))
+        self._outputs: MeasuredOutputs | None = MeasuredOutputs(LoopedEngine(self._packed))
         self._make(q, u, -math.inf if self._packed.goes_by_time else math.inf)
 
     def _make(self, q: Array, u: Array, reach: float) -> None:
         """A run that starts; before `reach` (s) its breaks are known."""
-        engine = Engine(self._packed)
+        engine = LoopedEngine(self._packed)
         system = self._system = SceneSystem(engine, self._code)
-        self._run: Run = make_run(system, self.settings, q, u, _ROWS)
+        self._run: Integrator = make_run(system, self.settings, q, u, _ROWS)
         self._settles = settles(engine)
         ffi, n = engine.ffi, len(self._names)
         self._places = {name: k for k, name in enumerate(self._names)}
@@ -134,10 +139,10 @@ class Session:
 
     def _refused_input(self, inputs: Any) -> SceneError:
         self._forget_given()
-        for name, value in by_name("inputs", inputs).items():
+        for name, value in mapping_by_name("inputs", inputs).items():
             if name not in self._places:
                 return SceneError(not_settable(self.model, name, self._names))
-            real(f'inputs["{name}"]', value)
+            finite_float(f'inputs["{name}"]', value)
         return SceneError(f"inputs = {inputs!r}: expected finite numbers by their names")
 
     def _forget_given(self) -> None:
@@ -192,7 +197,7 @@ class Session:
         if not self._settles:
             return y
         t = np.array([self.t])
-        return settled(self._system, t, y[None], self._system.memory[None])[0][0]
+        return project_samples(self._system, t, y[None], self._system.memory[None])[0][0]
 
     @property
     def risks(self) -> tuple[Risk, ...]:
@@ -242,9 +247,9 @@ class Session:
         memory, n = self._system.memory, len(self._names)
         return memory[len(memory) - n :]
 
-    def _now(self) -> Compiled:
+    def _now(self) -> CompiledScene:
         """The model under the inputs of now."""
-        return self.model.renewed(with_values(self.model.packed, self.inputs))
+        return self.model.renewed(with_input_values(self.model.packed, self.inputs))
 
     def copy(self) -> Self:
         """A session of its own that stands where this one does, and goes on alike."""
@@ -270,7 +275,7 @@ class Session:
         return f"<Session: t = {self.t:.9g} s{self.stopped and ', '}{self.stopped}>"
 
 
-def step_risks(model: Compiled, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
+def step_risks(model: CompiledScene, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
     """What speaks against a fixed step over as many as a session will make, from (nq,), (nu,)."""
     refuse_method(settings)
     assert settings.step is not None
@@ -281,27 +286,27 @@ def step_risks(model: Compiled, settings: Settings, q: Array, u: Array) -> tuple
 
 def refuse_method(settings: Settings) -> None:
     """SceneError for methods that make whole runs."""
-    if settings.method in (AUTO, *second_opinion.METHODS, *classical.METHODS):
+    if settings.method in (AUTO, *external_integrators.METHODS, *classical_run.METHODS):
         raise SceneError(
             f'method "{settings.method}" makes whole runs: use simulate, or for a session a method '
             "such as rk4 (with step), dop853, rodas5p or genalpha"
         )
 
 
-def settable(model: Compiled) -> tuple[str, ...]:
+def settable(model: CompiledScene) -> tuple[str, ...]:
     """The inputs that may be set while a model moves: those that nothing is driven by, that no
     controller sets, and that do not go by time."""
-    driving = {name for one in acting(model.scene) if one.drive for name in one.inputs}
+    driving = {name for one in active_expressions(model.scene) if one.drive for name in one.inputs}
     moving = {name for name, number in model.packed.channels.items() if not number.stands}
     taken = {*driving, *model.scene.controlled, *moving}
     return tuple(one.name for one in model.scene.input if one.name not in taken)
 
 
-def not_settable(model: Compiled, name: str, names: Sequence[str]) -> str:
+def not_settable(model: CompiledScene, name: str, names: Sequence[str]) -> str:
     """Why an input cannot be set while a model moves."""
     if name in model.scene.controlled:
         return f'inputs["{name}"]: controller "{model.scene.controlled[name]}" sets this input'
-    for one in acting(model.scene):
+    for one in active_expressions(model.scene):
         if one.drive and name in one.inputs and any(i.name == name for i in model.scene.input):
             return (
                 f'inputs["{name}"]: the {one.what} follows this input, and a drive that jumps is a '
@@ -312,4 +317,4 @@ def not_settable(model: Compiled, name: str, names: Sequence[str]) -> str:
             f'inputs["{name}"]: this input goes by time, by a signal or by its rates; give it a '
             "number before the session, by with_inputs, to set it"
         )
-    return f'inputs["{name}"]: there is no such input in the scene{near(name, names)}'
+    return f'inputs["{name}"]: there is no such input in the scene{did_you_mean(name, names)}'

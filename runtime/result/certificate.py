@@ -5,26 +5,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from mstmm.arrays import real
-from mstmm.markup import Displayed, table
+from mstmm.array_validation import finite_float
+from mstmm.notebook_html import NotebookDisplay, table
 from mstmm.risk import Risk, order_risks, sentences
 
-from ..integrate.reached import ReachedError
+from ..integrate.achieved_error import AchievedError
 from ..run.error_estimate import ANGLE, PART, ErrorEstimate, limit
-from ..run.stability import StepCheck
-from .closure import Closure
-from .conditioning import LARGEST, PivotLoss, SingularDistance
-from .control import Control
-from .evidence import Drift, Give
-from .flexible import certify
+from ..run.step_stability import StepCheck
+from .certificate_data import Drift, SpringDeflection
+from .conditioning import MAX_CHECKED_BODIES, PivotLoss, SingularDistance
+from .flexible import model_range
 from .flexible import risks as flexible_risks
-from .flexible.certify import Flexibility
-from .risks import of_balances, of_numbers, of_quaternions
-from .verdict import ACCURACY, Verdict
+from .flexible.model_range import ModelRange
+from .loop_closure_error import Closure
+from .result_risks import balance_risks, finiteness_risks, quaternion_risks
+from .step_control import StepControl
+from .verdict import DEFAULT_ACCURACY, Verdict
 
 
 @dataclass(frozen=True)
-class Certificate(Displayed):
+class Certificate(NotebookDisplay):
     """Quality report of a run.
 
     Attributes:
@@ -65,24 +65,26 @@ class Certificate(Displayed):
     error: ErrorEstimate | None
     finite: bool
     end: str
-    control: Control
+    control: StepControl
     later: StepCheck | None = None
     too_large: bool = False
     samples: int = 2
-    flexible: tuple[Flexibility, ...] = ()
-    give: Give | None = None
+    flexible: tuple[ModelRange, ...] = ()
+    give: SpringDeflection | None = None
     failures: tuple[str, ...] = ()
     models: tuple[Risk, ...] = ()
     known: tuple[Risk, ...] = ()
-    reached: ReachedError | None = None
+    reached: AchievedError | None = None
     closure: Closure | None = None
 
-    def verdict(self, accuracy: float = ACCURACY, balance: float | None = None) -> Verdict:
+    def verdict(self, accuracy: float = DEFAULT_ACCURACY, balance: float | None = None) -> Verdict:
         """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
         angles as a part of how far they went) and `balance` (relative, of energy and momentum; None
         for what the run's own tolerance or step leaves)."""
-        given = None if balance is None else real("balance", balance, "a part")
-        return _verdict(self, real("accuracy", accuracy, "rad, or a part of the motion"), given)
+        given = None if balance is None else finite_float("balance", balance, "a part")
+        return _verdict(
+            self, finite_float("accuracy", accuracy, "rad, or a part of the motion"), given
+        )
 
     @property
     def trusted(self) -> bool:
@@ -92,17 +94,17 @@ class Certificate(Displayed):
     @cached_property
     def risks(self) -> tuple[Risk, ...]:
         """Findings about the run, objections first; empty for a clean run."""
-        pivot, locked = self.pivot, self.singular
-        if pivot and locked and locked.risk and pivot.hinge == locked.hinge:
+        pivot, singular = self.pivot, self.singular
+        if pivot and singular and singular.risk and pivot.hinge == singular.hinge:
             pivot = None  # it vanishes where the coordinates fail
-        early = self.step is not None and self.step.risk is not None
-        looked_at = (pivot, locked, self.step if early else self.later)
+        is_too_long_at_start = self.step is not None and self.step.risk is not None
+        checked = (pivot, singular, self.step if is_too_long_at_start else self.later)
         return order_risks((
-            *of_numbers(self.finite, self.reached), *self.known,
-            *of_balances((self.energy, *self.momentum), self.control),
-            *of_quaternions(self.quaternion_residual),
-            *(x.risk for x in looked_at if x is not None and x.risk is not None),
-            *flexible_risks.risks(self.flexible), *self.models,
+            *finiteness_risks(self.finite, self.reached), *self.known,
+            *balance_risks((self.energy, *self.momentum), self.control),
+            *quaternion_risks(self.quaternion_residual),
+            *(x.risk for x in checked if x is not None and x.risk is not None),
+            *flexible_risks.flexibility_risks(self.flexible), *self.models,
         ))  # fmt: skip
 
     @property
@@ -123,7 +125,7 @@ class Certificate(Displayed):
     @property
     def covers(self) -> str:
         """What the estimated error is the error of, and what it is not."""
-        return _covered(self)
+        return _error_scope(self)
 
     def __str__(self) -> str:
         return self.text()
@@ -142,10 +144,10 @@ class Certificate(Displayed):
 
     def rows(self, verdict: bool = True, warnings: bool = True) -> list[tuple[str, str]]:
         """Certificate as pairs (name, text)."""
-        few = "not determined: one sample tells of no change; ask for more output times"
+        not_determined = "not determined: one sample tells of no change; ask for more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
         rows.append(("run", self.end))
-        rows.append(("energy balance", few if self.samples < 2 else str(self.energy)))
+        rows.append(("energy balance", not_determined if self.samples < 2 else str(self.energy)))
         if self.samples > 1:
             rows += [(d.name, str(d)) for d in self.momentum]
         if self.quaternion_residual:
@@ -155,7 +157,7 @@ class Certificate(Displayed):
         if self.pivot is not None:
             rows.append(("pivot ratio", f'{self.pivot.ratio:.1e} at hinge "{self.pivot.hinge}"'))
         elif self.too_large:
-            rows.append(("pivot ratio", f"not computed for more than {LARGEST} bodies"))
+            rows.append(("pivot ratio", f"not computed for more than {MAX_CHECKED_BODIES} bodies"))
         if self.singular is not None:
             rows.append(
                 ("singular angle", f'{self.singular.measure:.1e} at "{self.singular.hinge}"')
@@ -164,7 +166,7 @@ class Certificate(Displayed):
             rows.append(("h |lambda| at the start", f"{self.step.product:.3g}"))
         if self.sum_of_local_errors is not None:
             rows.append(("sum of local errors", f"{self.sum_of_local_errors:.1e} (not the error)"))
-        rows += certify.rows(self.flexible)
+        rows += model_range.rows(self.flexible)
         rows += _error_rows(self)
         rows += [("warning", text) for text in self.warnings] if warnings else []
         return rows
@@ -176,29 +178,31 @@ class Certificate(Displayed):
 def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
     """The verdict within bounds: `accuracy` of the error in rad, of coordinates that are no angles
     as a part of how far they went; `balance` of energy and momentum, relative."""
-    kept = c.control.bound if balance is None else balance
-    against = list(c.failures) + [
-        f"{d.name} changes by {d}, more than the {kept:g} asked for"
+    balance_bound = c.control.bound if balance is None else balance
+    objections = list(c.failures) + [
+        f"{d.name} changes by {d}, more than the {balance_bound:g} asked for"
         for d in (c.energy, *c.momentum)
-        if kept < d.relative <= c.control.bound
+        if balance_bound < d.relative <= c.control.bound
     ]
     missing = []
     if c.samples < 2:
         missing.append("one sample tells nothing of energy and momentum")
     if c.error is not None:
-        against += _uncovered(c.error) + _inaccurate(c, accuracy)
+        objections += _uncovered_objections(c.error) + _accuracy_objections(c, accuracy)
     elif c.reached is None:
         missing.append("no second run has told its error (certify=True)")
-    against += c.doubts
-    words = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
+    objections += c.doubts
+    bounds = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
     if c.reached is not None:
-        words = f"the error of {c.reached.of} as asked for"
+        bounds = f"the error of {c.reached.of} as asked for"
     return Verdict(
-        tuple(dict.fromkeys(against)), tuple(missing), f"{words}, balances within {kept:g}"
-    )  # fmt: skip
+        tuple(dict.fromkeys(objections)),
+        tuple(missing),
+        f"{bounds}, balances within {balance_bound:g}",
+    )
 
 
-def _uncovered(error: ErrorEstimate) -> list[str]:
+def _uncovered_objections(error: ErrorEstimate) -> list[str]:
     """Objection that a failed second run leaves the error unknown after its end."""
     if error.covered is None:
         return []
@@ -208,21 +212,23 @@ def _uncovered(error: ErrorEstimate) -> list[str]:
     ]
 
 
-def _inaccurate(c: Certificate, accuracy: float) -> list[str]:
+def _accuracy_objections(c: Certificate, accuracy: float) -> list[str]:
     """Objections to units of q whose estimated error over the run exceeds `accuracy`."""
     assert c.error is not None
-    found = []
+    objections = []
     for unit, values in c.error.q.items():
         worst = float(values.max(initial=0.0))
         if worst > limit(c.error.moved, unit, accuracy, accuracy):
-            part = (
+            motion = (
                 "" if unit == "rad" else f" of {c.error.moved.get(unit, 0.0):.2g} {unit} of motion"
             )
-            found.append(f"the error of q may be {worst:.1e} {unit or '1'}{part}{_until(c.error)}")
-    return found
+            objections.append(
+                f"the error of q may be {worst:.1e} {unit or '1'}{motion}{_horizon_note(c.error)}"
+            )
+    return objections
 
 
-def _until(error: ErrorEstimate) -> str:
+def _horizon_note(error: ErrorEstimate) -> str:
     if error.horizon is None:
         return ""
     if error.nowhere:
@@ -237,41 +243,46 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
     error = c.error
     rows = [] if c.reached is None else [("error", str(c.reached))]
     if error is None:
-        covered = [("what this covers", c.covers)]
+        scope_rows = [("what this covers", c.covers)]
         missing = [("error", "not estimated (certify=True makes a second run)")]
-        return rows + covered if rows else missing
-    within = error.horizon is not None and not error.nowhere
-    until = f" up to t = {error.horizon:.6g} s" if within else ""
-    whole = "over the whole run"
+        return rows + scope_rows if rows else missing
+    is_limited = error.horizon is not None and not error.nowhere
+    until = f" up to t = {error.horizon:.6g} s" if is_limited else ""
+    covered_span = "over the whole run"
     if error.covered is not None:
-        whole = f"up to t = {error.covered:.6g} s, none beyond"
-        until = until or f" {whole}"
+        covered_span = f"up to t = {error.covered:.6g} s, none beyond"
+        until = until or f" {covered_span}"
     for kind in ("q", "u"):
-        at_all = f"; {_values(error.whole(kind))} {whole}" if within else ""
-        values = _values(error.largest(kind) if within else error.whole(kind))
+        whole_run = f"; {_format_errors(error.whole(kind))} {covered_span}" if is_limited else ""
+        values = _format_errors(error.largest(kind) if is_limited else error.whole(kind))
         if values:
-            about = f" (from a second run, {error.reference})" if kind == "q" else ""
-            rows.append((f"error of {kind}, at most", f"{values}{until}{at_all}{about}"))
+            source = f" (from a second run, {error.reference})" if kind == "q" else ""
+            rows.append((f"error of {kind}, at most", f"{values}{until}{whole_run}{source}"))
     rows.append(("what this covers", c.covers))
     if error.horizon is not None:
-        since = (
-            f"t = {error.horizon:.6g} s: later" if within else "the start: from the first sample on"
+        horizon_text = (
+            f"t = {error.horizon:.6g} s: later"
+            if is_limited
+            else "the start: from the first sample on"
         )
-        rows.append((
-            "predictable until",
-            f"{since} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of the motion, "
-            "and errors have no meaning",
-        ))  # fmt: skip
+        rows.append(
+            (
+                "predictable until",
+                f"{horizon_text} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of "
+                f"the motion, "
+                "and errors have no meaning",
+            )
+        )
     if error.tenfold is not None:
         rows.append(("growth of errors", f"tenfold every {error.tenfold:.3g} s"))
     return rows
 
 
-def _values(errors: dict[str, float]) -> str:
+def _format_errors(errors: dict[str, float]) -> str:
     return ", ".join(f"{value:.1e} {unit or '1'}" for unit, value in errors.items())
 
 
-def _covered(c: Certificate) -> str:
+def _error_scope(c: Certificate) -> str:
     """What the estimated error is the error of, and what it is not."""
     parts = ["the integration in time, not how well the scene stands for what is meant"]
     if c.flexible:

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..integrate.loop import Statistics
+from ..integrate.c_loop import Statistics
 from ..run.error_estimate import ErrorEstimate
-from ..run.stability import check_later
-from . import gives
-from .balances import energy, momentum
+from ..run.step_stability import check_later
+from . import spring_deflection
 from .certificate import Certificate
-from .closure import closure
-from .conditioning import LARGEST, pivot_loss, singular_distance
-from .control import control
-from .flexible import certify
-from .narrow import passed_over
-from .owners.contacts import find_pulling_contacts
-from .record import Record
-from .risks import of_outputs
+from .conditioning import MAX_CHECKED_BODIES, pivot_loss, singular_distance
+from .conservation import energy_drift, momentum_drifts
+from .flexible import model_range
+from .loop_closure_error import loop_closure
+from .narrow_features import missed_feature_risks
+from .result_record import Record
+from .result_risks import output_risks
+from .sources.contacts import find_pulling_contacts
+from .step_control import step_control
 
 
-def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
+def build_certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
     """Build the certificate of a result; `error` is the estimate of a second run."""
     run, statistics = result.trajectory, result.statistics
     return Certificate(
-        energy=energy(result),
-        momentum=tuple(momentum(result)),
+        energy=energy_drift(result),
+        momentum=tuple(momentum_drifts(result)),
         quaternion_residual=run.norm_residual,
         pivot=pivot_loss(result.model, run),
         singular=singular_distance(result.model, run),
@@ -34,29 +34,29 @@ def certificate(result: Record, error: ErrorEstimate | None) -> Certificate:
         stability_limited=(
             statistics is not None and statistics.stability_limited and not run.methods
         ),
-        sum_of_local_errors=_local_errors(statistics),
+        sum_of_local_errors=_finite_local_error_sum(statistics),
         error=error,
         finite=bool(np.isfinite(run.q).all() and np.isfinite(run.u).all()),
         end=result.message,
-        control=control(run.settings, run.reached),
-        too_large=len(result.model.scene.bodies) > LARGEST,
+        control=step_control(run.settings, run.reached),
+        too_large=len(result.model.scene.bodies) > MAX_CHECKED_BODIES,
         samples=len(result.t),
-        flexible=certify.flexibilities(result._flexible),
-        give=gives.stiffest(result),
+        flexible=model_range.model_ranges(result._flexible),
+        give=spring_deflection.stiffest_spring_deflection(result),
         failures=() if result.success else (result.message,),
         models=result._outside(),
         known=(
             *run.risks,
-            *passed_over(result.model, run),
+            *missed_feature_risks(result.model, run),
             *find_pulling_contacts(result),
-            *of_outputs(run, result.outputs()),
+            *output_risks(run, result.outputs()),
         ),
         reached=run.reached,
-        closure=closure(result.model, run),
+        closure=loop_closure(result.model, run),
     )
 
 
-def _local_errors(statistics: Statistics | None) -> float | None:
+def _finite_local_error_sum(statistics: Statistics | None) -> float | None:
     """Sum of local errors; None where it is not finite or there are no statistics."""
     total = None if statistics is None else statistics.sum_local_error
     return total if total is not None and np.isfinite(total) else None

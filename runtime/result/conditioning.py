@@ -16,34 +16,34 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
-from .flexible.pivots import ModalPivots
+from .flexible.modal_pivots import ModalPivots
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
     from ..run.trajectory import Trajectory
 
 
 #: Pivot loss and singular measure from which on they are risks.
-LOSS, SINGULAR = 1e8, 1e-4
+MAX_PIVOT_LOSS, MIN_SINGULAR_MEASURE = 1e8, 1e-4
 #: Pivot loss up to which refined accelerations keep their digits.
-REFINED = 1e13
+MAX_REFINED_LOSS = 1e13
 
 #: Change of angles within a fixed step (rad) that is one where the measure is below the first.
-NEAR, TURNED = 0.1, 0.3
+NEAR_SINGULAR_MEASURE, MAX_STEP_ANGLE = 0.1, 0.3
 
 #: Maximum number of samples at which the pivots are checked.
-SAMPLES = 12
+MAX_PIVOT_SAMPLES = 12
 
 #: Limit of bodies times samples of this check; one sample is always checked.
-_WORK = 20_000
+_MAX_BODY_SAMPLES = 20_000
 
 #: Scenes with more bodies are not checked: that would take longer than the run.
-LARGEST = 200_000
+MAX_CHECKED_BODIES = 200_000
 
-_UPPER = np.triu_indices(6)
+_UPPER_TRIANGLE = np.triu_indices(6)
 
 
 @dataclass(frozen=True)
@@ -65,12 +65,12 @@ class PivotLoss:
     @property
     def sweep(self) -> str:
         """Name of the sweep that avoids this loss of digits."""
-        return "qr" if self.refines or self.ratio > REFINED else "refined"
+        return "qr" if self.refines or self.ratio > MAX_REFINED_LOSS else "refined"
 
     @property
     def risk(self) -> Risk | None:
         """Finding that digits are lost; None for a loss up to LOSS."""
-        if not self.error > 1e-16 * LOSS:
+        if not self.error > 1e-16 * MAX_PIVOT_LOSS:
             return None
         refined = f", refined {self.refines} times" if self.refines else ""
         return Risk(
@@ -78,7 +78,7 @@ class PivotLoss:
             f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
             f"body behind light ones): accelerations may err by {self.error:.0e} of their "
             f"size{refined}", f'sweep = "{self.sweep}" keeps them (explicit methods); or, where '
-            "the root is free, make the heavy body the first one", self.ratio, LOSS,
+            "the root is free, make the heavy body the first one", self.ratio, MAX_PIVOT_LOSS,
         )  # fmt: skip
 
 
@@ -96,16 +96,24 @@ class SingularDistance:
     def risk(self) -> Risk | None:
         """That the coordinates come to where they fail, or that fixed steps are too long for how
         fast they are near it; None else."""
-        near = f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
-        near += f"coordinates fail, at about t = {self.time:.4g} s"
-        if self.measure < SINGULAR:
-            return Risk("gimbal", f'hinge "{self.hinge}"', near, "use a ball hinge", self.measure,
-                        SINGULAR)  # fmt: skip
-        if self.measure < NEAR and self.turned > TURNED:
+        approach = (
+            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
+        )
+        approach += f"coordinates fail, at about t = {self.time:.4g} s"
+        if self.measure < MIN_SINGULAR_MEASURE:
+            return Risk(
+                "gimbal",
+                f'hinge "{self.hinge}"',
+                approach,
+                "use a ball hinge",
+                self.measure,
+                MIN_SINGULAR_MEASURE,
+            )
+        if self.measure < NEAR_SINGULAR_MEASURE and self.turned > MAX_STEP_ANGLE:
             return Risk(
                 "gimbal", f'hinge "{self.hinge}"',
-                f"{near}, and its angles change there by {self.turned:.2g} rad within a step",
-                "use a ball hinge, or a method that chooses its steps", self.turned, TURNED,
+                f"{approach}, and its angles change there by {self.turned:.2g} rad within a step",
+                "use a ball hinge, or a method that chooses its steps", self.turned, MAX_STEP_ANGLE,
                 "rad",
             )  # fmt: skip
         return None
@@ -114,38 +122,43 @@ class SingularDistance:
 # --- pivots ---------------------------------------------------------------------------------------
 
 
-def pivot_loss(model: Compiled, run: Trajectory) -> PivotLoss | None:
+def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
     """The worst of some samples spread over the run; None where nothing moves freely, for scenes of
     more than LARGEST bodies, and by least squares, which make no such difference."""
-    if not len(run.t) or not model.nu or len(model.scene.bodies) > LARGEST or model.packed.qr:
+    if (
+        not len(run.t)
+        or not model.nu
+        or len(model.scene.bodies) > MAX_CHECKED_BODIES
+        or model.packed.qr
+    ):
         return None
     if model.packed.system.closes:
         return None
     refines = int(model.packed.model.refines)
-    worst, pivots = PivotLoss(0.0, "", 0.0, refines), _Pivots(model)
-    count = int(np.clip(_WORK // len(pivots.parents), 1, SAMPLES))
+    worst, pivots = PivotLoss(0.0, "", 0.0, refines), _PivotRatios(model)
+    count = int(np.clip(_MAX_BODY_SAMPLES // len(pivots.parents), 1, MAX_PIVOT_SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
-        one = slice(k, k + 1)
-        seen = model.looped.observe(
-            run.t[one], run.q[one], run.u[one], run.memory[one], parts=("udot",)
+        sample = slice(k, k + 1)
+        observation = model.looped.observe(
+            run.t[sample], run.q[sample], run.u[sample], run.memory[sample], parts=("udot",)
         )
-        if seen.failures:
+        if observation.failures:
             continue
         try:
             ratios = pivots.ratios(model.looped.workspace_array(), run.memory[k])
         except np.linalg.LinAlgError:  # numbers that overflow in products, or underflow
             continue
-        place = int(ratios.argmax())
-        if ratios[place] > worst.ratio:
-            hinge = model.looped.hinge_name(place)
-            worst = PivotLoss(float(ratios[place]), hinge, float(run.t[k]), refines)
+        hinge_index = int(ratios.argmax())
+        if ratios[hinge_index] > worst.ratio:
+            hinge = model.looped.hinge_name(hinge_index)
+            worst = PivotLoss(float(ratios[hinge_index]), hinge, float(run.t[k]), refines)
     return worst if worst.hinge else None
 
 
-class _Pivots:
+class _PivotRatios:
     """Where the engine keeps inertias and motion subspaces of all n bodies."""
 
-    def __init__(self, model: Compiled) -> None:
+    def __init__(self, model: CompiledScene) -> None:
         packed, lib = model.packed, model.looped.lib
         system = packed.system
         self.parents = system.parents
@@ -160,8 +173,8 @@ class _Pivots:
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
         self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
         self.release = system.rows(lambda body: body.release)
-        self.rotor = system.rows(lambda body: _six(body.rotor))
-        self.imposed = system.rows(lambda body: _six(body.imposed)) != 0
+        self.rotor = system.rows(lambda body: _pad_to_six(body.rotor))
+        self.imposed = system.rows(lambda body: _pad_to_six(body.imposed)) != 0
         self.modal = ModalPivots(packed, lib)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
@@ -171,77 +184,79 @@ class _Pivots:
         X^T P^T E P X, P = 1 - H D^-1 H^T S.  The ratio is H^T E H / pivot of D.
         """
         S = np.zeros((len(self.parents), 6, 6))
-        S[:, _UPPER[0], _UPPER[1]] = numbers[self.inertia]
+        S[:, _UPPER_TRIANGLE[0], _UPPER_TRIANGLE[1]] = numbers[self.inertia]
         S = S + np.triu(S, 1).transpose(0, 2, 1)
         free = self.there & ~(self.imposed & ~self._released(memory)[:, None])
         H = np.where(free[:, None, :], numbers[self.subspace], 0.0)
         D = H.transpose(0, 2, 1) @ S @ H + (self.rotor * free + ~free)[:, :, None] * np.eye(6)
         inverse = np.linalg.inv(D)
-        given_way = np.eye(6) - H @ inverse @ H.transpose(0, 2, 1) @ S
-        turn = numbers[self.turn].reshape(-1, 3, 3)
-        carried = _carried_motion(turn, numbers[self.shift])
+        projection = np.eye(6) - H @ inverse @ H.transpose(0, 2, 1) @ S
+        rotation = numbers[self.turn].reshape(-1, 3, 3)
+        motion = _carried_motion(rotation, numbers[self.shift])
         E = np.abs(np.diagonal(S, axis1=1, axis2=2))[:, :, None] * np.eye(6)
-        self.modal.through(numbers, S, carried, self.parents, E)
-        passed = given_way @ carried
+        self.modal.through(numbers, S, motion, self.parents, E)
+        transfer = projection @ motion
         for i in range(len(self.parents) - 1, -1, -1):
             parent = self.parents[i]
             if parent >= 0:
-                E[parent] += passed[i].T @ E[i] @ passed[i]
+                E[parent] += transfer[i].T @ E[i] @ transfer[i]
         rounding = np.sum(H * (E @ H), axis=1)
         pivots = 1.0 / np.diagonal(inverse, axis1=1, axis2=2)
         ratios = np.where(free, rounding / np.maximum(np.abs(pivots), 1e-300), 0.0)
         return np.asarray(ratios.max(axis=1))
 
     def _released(self, memory: Array) -> NDArray[np.bool_]:
-        known = np.append(memory, 0.0)
-        return np.asarray(known[self.release] != 0.0) & (self.release >= 0)
+        padded_memory = np.append(memory, 0.0)
+        return np.asarray(padded_memory[self.release] != 0.0) & (self.release >= 0)
 
 
-def _six(numbers: Sequence[float]) -> list[float]:
+def _pad_to_six(numbers: Sequence[float]) -> list[float]:
     """Numbers per speed, padded with zeros to six."""
     return [*numbers, *[0.0] * (6 - len(numbers))]
 
 
 def _carried_motion(turn: Array, shift: Array) -> Array:
     """(n, 6, 6): twist of P in its own axes from that of the parent with the hinge locked."""
-    back = turn.transpose(0, 2, 1)
-    moved = np.zeros((len(turn), 6, 6))
-    moved[:, :3, :3] = moved[:, 3:, 3:] = back
-    moved[:, :3, 3:] = back @ np.cross(np.eye(3), shift[:, None, :]).transpose(0, 2, 1)
-    return moved
+    transposed = turn.transpose(0, 2, 1)
+    motion = np.zeros((len(turn), 6, 6))
+    motion[:, :3, :3] = motion[:, 3:, 3:] = transposed
+    motion[:, :3, 3:] = transposed @ np.cross(np.eye(3), shift[:, None, :]).transpose(0, 2, 1)
+    return motion
 
 
 # --- coordinates that fail ------------------------------------------------------------------------
 
 
-def may_be_singular(model: Compiled) -> bool:
+def may_be_singular(model: CompiledScene) -> bool:
     """Whether any hinge has singular coordinates somewhere."""
     return any(
-        _measure(model, group.first + k) is not None
+        _singularity_kernel(model, group.first + k) is not None
         for group in model.layout.groups
         for k in range(min(group.count, len(group.hinges)))
     )
 
 
-def singular_distance(model: Compiled, run: Trajectory) -> SingularDistance | None:
+def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance | None:
     """The smallest measure over all samples and hinges that have one; None without such hinges.
 
     A change of sign between two samples counts as zero: the coordinates failed in between.
     """
-    found: list[SingularDistance] = []
+    distances: list[SingularDistance] = []
     for group in model.layout.groups:
         for k in range(min(group.count, len(group.hinges))):
-            function = _measure(model, group.first + k)
-            if function is None:
+            kernel = _singularity_kernel(model, group.first + k)
+            if kernel is None:
                 continue
             for number in range(group.first + k, group.first + group.count, len(group.hinges)):
-                measures = _measures(model, run, number, function)
+                measures = _singularity_measures(model, run, number, kernel)
                 if len(measures):
-                    found.append(_smallest(model, run, number, measures))
-    return min(found, key=lambda one: one.measure, default=None)
+                    distances.append(_smallest_distance(model, run, number, measures))
+    return min(distances, key=lambda one: one.measure, default=None)
 
 
-def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) -> SingularDistance:
+def _smallest_distance(
+    model: CompiledScene, run: Trajectory, number: int, measures: Array
+) -> SingularDistance:
     k = int(np.abs(measures).argmin())
     changes = np.flatnonzero(measures[1:] * measures[:-1] < 0)
     value, time = float(abs(measures[k])), float(run.t[k])
@@ -250,24 +265,24 @@ def _smallest(model: Compiled, run: Trajectory, number: int, measures: Array) ->
         part = measures[k] / (measures[k] - measures[k + 1])
         time = float(run.t[k] + part * (run.t[k + 1] - run.t[k]))
     speeds = np.abs(run.u[:, model.layout.slots(number).u_slice])
-    turned = (run.settings.step or 0.0) * float(np.nanmax(speeds, initial=0.0))
+    angle_per_step = (run.settings.step or 0.0) * float(np.nanmax(speeds, initial=0.0))
     name = model.packed.scene.hinges.name(number)
-    return SingularDistance(value, name, time, turned)
+    return SingularDistance(value, name, time, angle_per_step)
 
 
-def _measure(model: Compiled, number: int) -> Any:
+def _singularity_kernel(model: CompiledScene, number: int) -> Any:
     """The kernel `singularity` of a hinge's type, None if it has none."""
     packed = model.packed
     if not packed.layout.slots(number).nq:
         return None
     body = packed.system.body(packed.topology.place_of_hinge(number))
-    function = packed.elements[body.hinge].functions.get("singularity")
-    if function is None:
+    kernel = packed.elements[body.hinge].functions.get("singularity")
+    if kernel is None:
         return None
-    return packed.ffi.cast("int (*)(const double *, const double *, double *)", function)
+    return packed.ffi.cast("int (*)(const double *, const double *, double *)", kernel)
 
 
-def _measures(model: Compiled, run: Trajectory, number: int, call: Any) -> Array:
+def _singularity_measures(model: CompiledScene, run: Trajectory, number: int, call: Any) -> Array:
     """Singularity measure of one hinge at every sample."""
     packed = model.packed
     ffi, slots = packed.ffi, packed.layout.slots(number)

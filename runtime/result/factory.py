@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from .result import Result
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
     from ..run.error_estimate import ErrorEstimate
     from ..run.trajectory import Trajectory
 
 
-def result_of(model: Compiled, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
+def result_of(model: CompiledScene, run: Trajectory, error: ErrorEstimate | None = None) -> Result:
     """Build the result of a run, with elastic responses where bodies are one-way."""
     expanded = model.packed.expanded
     rigid = None if expanded is None else expanded.rigidified

@@ -12,40 +12,40 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arguments import word_of
-from mstmm.arrays import Array
+from mstmm.argument_validation import require_word
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.scene import Output
-from mstmm.scene.rules.messages import near
+from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ..engine.shown import (
-    BODY,
-    COLUMNS,
+from ..engine.observation_columns import (  # fmt: skip
+    BODY_QUANTITIES,
+    POINT_COLUMNS,
     SUMS,
     WXYZ,
     XYZ,
-    Kind,
-)  # fmt: skip
-from ..pack.layout import HingeSlots
-from .flexible.names import add_body
-from .names import Quantity, Table, Values
-from .observed import quaternions
-from .outputs import component_of, one_quantity, quantity_of
-from .owners.acting import Acting
-from .owners.angles import EULER, euler, gimbal
-from .owners.bushings import add_bushing
-from .owners.constraints import add_constraint, add_coupling
-from .owners.hinges import add_hinge, add_modes
-from .owners.loads import add_load
-from .owners.springs import add_spring
+    QuantityKind,
+)
+from ..packing.coordinate_layout import HingeSlots
+from .flexible.flexible_quantity_names import add_body_quantities
+from .observations import quaternions
+from .quantity_names import Quantity, Table, Values
+from .scene_outputs import component_of, quantity_of, single_quantity_name
+from .sources.applied_loads import AppliedLoads
+from .sources.bushings import add_bushing
+from .sources.constraints import add_constraint, add_coupling
+from .sources.euler_angles import EULER_KIND, euler_angles, gimbal_note
+from .sources.hinges import add_hinge, add_modes
+from .sources.loads import add_load
+from .sources.springs import add_spring
 
 if TYPE_CHECKING:
     from .flexible.quantities import FlexibleResults
-    from .observed import Observed
+    from .observations import Observations
 
 
 #: Quantities whose time derivatives are quantities too.
-RATES = {
+RATE_KINDS = {
     "position": "velocity", "velocity": "acceleration", "angular_velocity": "angular_acceleration",
 }  # fmt: skip
 
@@ -57,25 +57,25 @@ class Quantities:
     coupling or the scene (""), when they are asked for.
     """
 
-    def __init__(self, observed: Observed, flexible: FlexibleResults) -> None:
+    def __init__(self, observed: Observations, flexible: FlexibleResults) -> None:
         self.observed, self.run = observed, observed.run
-        self._flexible, self.acting = flexible, Acting(observed)
+        self._flexible, self.acting = flexible, AppliedLoads(observed)
         self.layout = observed.engine.packed.layout
         self._named = observed.references.scene.names
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
         #: What adds the quantities of whatever else acts or closes loops, by its name.
         self._more: dict[str, list[Callable[[Table], None]]] = {}
-        scene, closing = observed.references.scene, observed.engine.packed.described
+        scene, loop_scene = observed.references.scene, observed.engine.packed.described
         for spring in scene.spring:
             self._owned(spring.name, partial(add_spring, acting=self.acting, spring=spring))
         for k, load in enumerate(scene.load):
             self._owned(load.name, partial(add_load, acting=self.acting, load=load, number=k))
         for bushing in scene.bushing:
             self._owned(bushing.name, partial(add_bushing, observed=observed, bushing=bushing))
-        for one in closing.constraint:
-            self._owned(one.name, partial(add_constraint, observed=observed, one=one))
-        for coupling in closing.coupling:
+        for constraint in loop_scene.constraint:
+            self._owned(constraint.name, partial(add_constraint, observed=observed, one=constraint))
+        for coupling in loop_scene.coupling:
             self._owned(coupling.name, partial(add_coupling, observed=observed, name=coupling.name))
 
     # --- of bodies ------------------------------------------------------------------------------
@@ -84,7 +84,7 @@ class Quantities:
         """(n, 3), or (n, 4) for the orientation."""
         points = self.observed.points(reference)
         if kind != "orientation":
-            return points[:, COLUMNS[kind]]
+            return points[:, POINT_COLUMNS[kind]]
         if reference not in self._orientations:
             self._orientations[reference] = quaternions(points[:, 15:24])
         return self._orientations[reference]
@@ -93,25 +93,25 @@ class Quantities:
 
     def slots(self, hinge: str) -> HingeSlots:
         """Place of a hinge in q and u; SceneError with the nearest name if there is none."""
-        word_of("hinge", hinge, "the name of a hinge")
-        found = self.layout.hinges.get(hinge)
-        if found is None:
+        require_word("hinge", hinge, "the name of a hinge")
+        hinge_slots = self.layout.hinges.get(hinge)
+        if hinge_slots is None:
             hinges = self.observed.references.scene.hinges
             if hinges.of_chain(hinge):
                 raise SceneError(f'"{hinge}": {hinges.missing(hinge)}')
-            hint = near(hinge, (*self.layout.hinges, *self._named.hinge))
+            hint = did_you_mean(hinge, (*self.layout.hinges, *self._named.hinge))
             raise SceneError(f'"{hinge}": there is no such hinge in the scene{hint}')
-        return found
+        return hinge_slots
 
     def of_hinge(self, hinge: str, kind: str) -> Array:
         """force or moment (n, 3)."""
-        if word_of("hinge", hinge, "the name of a hinge") in self.layout.modal:
+        if require_word("hinge", hinge, "the name of a hinge") in self.layout.modal:
             raise SceneError(
                 f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
                 "that holds it"
             )
-        own = self.slots(hinge).name
-        return self.observed.loads(own, 0 if kind == "force" else 3)
+        hinge_name = self.slots(hinge).name
+        return self.observed.loads(hinge_name, 0 if kind == "force" else 3)
 
     def effort(self, hinge: str) -> Array:
         """Efforts (n, nu) of laws and drives along the speeds of a hinge."""
@@ -131,12 +131,14 @@ class Quantities:
         """The quantity of this name; SceneError with the nearest name if there is none."""
         if not isinstance(name, str):
             raise SceneError(f"quantity {name!r}: expected a name, such as energy")
-        for own in self._named.meant(name):
-            if (entry := self._entry(own)) is not None:
-                return entry() if own == name else replace(entry(), name=name)
-        owners = [one for own in self._named.meant(name) for one in self._owners_in(own)]
-        known = [n for owner in owners for n in self.of(owner).entries]
-        hint = near(name, (*known, *self._every()))
+        for full_name in self._named.meant(name):
+            if (entry := self._entry(full_name)) is not None:
+                return entry() if full_name == name else replace(entry(), name=name)
+        owners = [
+            one for full_name in self._named.meant(name) for one in self._owners_in(full_name)
+        ]
+        known_names = [n for owner in owners for n in self.of(owner).entries]
+        hint = did_you_mean(name, (*known_names, *self._every()))
         raise SceneError(f'"{name}": there is no such quantity{hint}')
 
     def _entry(self, name: str) -> Callable[[], Quantity] | None:
@@ -172,23 +174,31 @@ class Quantities:
 
     def outputs(self) -> list[str]:
         """The outputs of the scene that this model has."""
-        there = self.of("").entries
-        return [one.name for one in self.observed.references.scene.output if one.name in there]
+        scene_entries = self.of("").entries
+        return [
+            output.name
+            for output in self.observed.references.scene.output
+            if output.name in scene_entries
+        ]
 
     def owners(self) -> Iterator[str]:
         """Hinges, bodies and ends, springs, loads, bushings, constraints, couplings, the scene."""
         yield from self.layout.hinges
         yield from self.observed.references
         bodies = (self.layout.hinges, self.observed.references)
-        yield from (name for name in self._more if not any(name in known for known in bodies))
+        yield from (
+            name
+            for name in self._more
+            if not any(name in bodies_of_kind for bodies_of_kind in bodies)
+        )
         yield ""
 
     def of(self, owner: str) -> Table:
         """Name table of one owner."""
         if owner not in self._tables:
             table = Table({}, [])
-            hinges, own = self.layout.hinges, self._named.hinge.get(owner, owner) == owner
-            if own and owner in hinges and owner not in self.layout.modal:
+            hinges, is_own_name = self.layout.hinges, self._named.hinge.get(owner, owner) == owner
+            if is_own_name and owner in hinges and owner not in self.layout.modal:
                 add_hinge(table, self.acting, hinges[owner])
             elif owner in self.observed.references:
                 self._body(table, owner)
@@ -200,26 +210,29 @@ class Quantities:
         return self._tables[owner]
 
     def _owns(self, owner: str) -> bool:
-        known = (self.layout.hinges, self.observed.references, self._more)
-        return any(owner in owners for owners in known)
+        owner_groups = (self.layout.hinges, self.observed.references, self._more)
+        return any(owner in owners for owners in owner_groups)
 
     def _owned(self, name: str, add: Callable[[Table], None]) -> None:
         self._more.setdefault(name, []).append(add)
 
     def _body(self, table: Table, reference: str) -> None:
-        for kind, about in BODY.items():
-            rates = RATES.get(kind)
+        for kind, description in BODY_QUANTITIES.items():
+            rates = RATE_KINDS.get(kind)
             table.vector(
-                f"{reference}.{kind}", reference, about, self._bound(self.of_body, reference, kind),
+                f"{reference}.{kind}",
+                reference,
+                description,
+                self._bound(self.of_body, reference, kind),
                 None if rates is None else self._bound(self.of_body, reference, rates),
-            )  # fmt: skip
+            )
         table.vector(
-            f"{reference}.euler", reference, EULER,
-            lambda: euler(self.observed.points(reference)[:, 15:24]), note=gimbal,
+            f"{reference}.euler", reference, EULER_KIND,
+            lambda: euler_angles(self.observed.points(reference)[:, 15:24]), note=gimbal_note,
         )  # fmt: skip
         if reference in self.layout.modal:
             add_modes(table, self.acting, self.layout.modal[reference])
-        add_body(table, self._flexible, reference)
+        add_body_quantities(table, self._flexible, reference)
 
     def _scene(self, table: Table) -> None:
         for name, (unit, long_name, columns) in SUMS.items():
@@ -227,20 +240,25 @@ class Quantities:
             if name == "energy" or columns.stop - columns.start == 1:
                 table.scalar(name, unit, long_name, get)
             else:
-                table.vector(name, "the scene", Kind(unit, long_name, XYZ, ()), get)
-        about = "work of everything that is not stored"
+                table.vector(name, "the scene", QuantityKind(unit, long_name, XYZ, ()), get)
+        work_label = "work of everything that is not stored"
         power = self._summed("power")
-        table.scalar("work", "J", about, lambda: self.run.work, rates=power)
+        table.scalar("work", "J", work_label, lambda: self.run.work, rates=power)
         scene = self.observed.references.scene
-        for word, given in (("input", scene.input), ("signal", scene.signal)):
-            for one in given:
-                table.scalar(one.name, one.unit, f"{word} {one.name}", self._over_time(one.name))
-        place = self.observed.engine.packed.system.held.first
+        for word, channels in (("input", scene.input), ("signal", scene.signal)):
+            for channel in channels:
+                table.scalar(
+                    channel.name,
+                    channel.unit,
+                    f"{word} {channel.name}",
+                    self._over_time(channel.name),
+                )
+        column = self.observed.engine.packed.system.held.first
         for controller in scene.controller:
             for k in range(len(controller.A)):
                 name, owner = f"{controller.name}.x[{k}]", f"controller {controller.name}"
-                table.scalar(name, "", f"state {k}", self._kept(place + 1 + k), owner=owner)
-            place += 1 + len(controller.A) + len(controller.outputs)
+                table.scalar(name, "", f"state {k}", self._kept(column + 1 + k), owner=owner)
+            column += 1 + len(controller.A) + len(controller.outputs)
         for output in scene.output:
             self._output(table, output)
 
@@ -262,7 +280,7 @@ class Quantities:
             return lambda: component_of(whole(), label)
 
         table.entries[output.name] = whole
-        source = one_quantity(output)
+        source = single_quantity_name(output)
         labels = [label for label in WXYZ if source and is_there(f"{source}.{label}")]
         for label in labels:
             table.entries[f"{output.name}.{label}"] = component(label)
@@ -273,9 +291,9 @@ class Quantities:
 
     def _over_time(self, name: str) -> Values:
         packed = self.observed.engine.packed
-        held = packed.system.held.places[packed.layout.inputs[name]]
-        if held >= 0:
-            return lambda: self.run.memory[:, held]
+        column = packed.system.held.places[packed.layout.inputs[name]]
+        if column >= 0:
+            return lambda: self.run.memory[:, column]
         channel = packed.system.inputs[packed.layout.inputs[name]]
         return lambda: np.array([channel.value(t) for t in self.run.t.tolist()])
 

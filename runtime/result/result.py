@@ -8,18 +8,18 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mstmm.arguments import path_of
-from mstmm.markup import Displayed, table
+from mstmm.argument_validation import require_path
+from mstmm.notebook_html import NotebookDisplay, table
 
 from .certificate import Certificate
-from .record import Record
+from .result_record import Record
 
 if TYPE_CHECKING:
-    from .plotting.shown import Candidate, Shown
-    from .view.view import View
+    from .plotting.plot_sources import Candidate, PlotSource
+    from .scene3d.view import SceneView
 
 
-class Result(Record, Displayed):
+class Result(Record, NotebookDisplay):
     """Result of a run: states and derived quantities at the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
@@ -52,30 +52,30 @@ class Result(Record, Displayed):
     @cached_property
     def certificate(self) -> Certificate:
         """Quality report of a run: balances, conditioning, estimated error.  Printable."""
-        from .certify import certificate
+        from .certify import build_certificate
 
-        return certificate(self, self._error)
+        return build_certificate(self, self._error)
 
     def pictures(self) -> tuple[str, ...]:
         """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of
         them), "blade.shape", "blade.deflection" (along the beam), "blade.modal_energy"."""
-        from .flexible.pictures import names
+        from .flexible.shape_panels import panel_names
 
-        return tuple(names(self))
+        return tuple(panel_names(self))
 
     def candidates(self) -> list[Candidate]:
         """Default quantities of `plot` and `table`."""
-        from .plotting.choice import candidates
+        from .plotting.default_quantities import default_candidates
 
-        return candidates(self)
+        return default_candidates(self)
 
     # --- out ------------------------------------------------------------------------------------
 
     def to_xarray(self) -> Any:
         """`xarray.Dataset` of every quantity with dimensions, units and provenance (extra: io)."""
-        from .output.dataset import dataset
+        from .export.xarray_dataset import to_dataset
 
-        return dataset(self)
+        return to_dataset(self)
 
     def save(self, path: str | Path) -> Path:
         """Write ".nc" (NetCDF, extra: io), ".csv" (a column per number) or ".mat" (for MATLAB, a
@@ -84,18 +84,18 @@ class Result(Record, Displayed):
         The file appears under its name when it is whole; then the checkpoint of a run that has
         ended is removed.  EnvironmentFailure if the extra is missing or the file cannot be written.
         """
-        from .output.storage import save
+        from .export.result_files import save_result
 
-        saved = save(self, path_of("result file", path))
+        saved = save_result(self, require_path("result file", path))
         if self.checkpoint is not None and self.status is not None:
             self.checkpoint.remove()
         return saved
 
     def table(self, *names: str, rows: int = 12) -> str:
         """A text table of some samples; by default of every hinge coordinate and the energy."""
-        from .output.table import table
+        from .export.text_table import text_table
 
-        return table(self, names, rows)
+        return text_table(self, names, rows)
 
     def plot(
         self,
@@ -105,7 +105,7 @@ class Result(Record, Displayed):
         ax: Any = None,
         against: str | None = None,
         kind: str = "time",
-        beside: Mapping[str, Shown] | None = None,
+        beside: Mapping[str, PlotSource] | None = None,
         label: str = "this run",
     ) -> Any:
         """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
@@ -140,8 +140,9 @@ class Result(Record, Displayed):
         trails: Sequence[str] = (),
         speed: float | None = None,
         title: str | None = None,
-    ) -> View:
-        """The run in three dimensions, to look at; with `path` also written there, see `View.save`.
+    ) -> SceneView:
+        """The run in three dimensions, to look at; with `path` also written there, see
+        `SceneView.save`.
 
         Bodies are drawn by their ends, mass centres and inertia, or by the shapes that the scene
         gives them; deflections of beams are as they are.  `trails` are ends whose ways are drawn;
@@ -149,14 +150,14 @@ class Result(Record, Displayed):
         above 20 s what makes a film of some seconds.  SceneError for an end that there is not and
         for a run without samples.
         """
-        from .view.view import view
+        from .scene3d.view import make_view
 
         if title is None:
             title = Path(path).stem if isinstance(path, str | Path) else "A run"
-        made = view(self, title, trails, speed)
+        scene_view = make_view(self, title, trails, speed)
         if path is not None:
-            made.save(path)
-        return made
+            scene_view.save(path)
+        return scene_view
 
     def report(
         self,
@@ -166,11 +167,11 @@ class Result(Record, Displayed):
         quantities: Sequence[str] = (),
         trails: Sequence[str] = (),
     ) -> Path:
-        """Write a self-contained report; see `mstmm.report`, which this calls."""
+        """Write a self-contained report; see `mstmm.write_report`, which this calls."""
         # by name: the equations come from derive, which this room does not know
         report = import_module("mstmm").report
-        made: Path = report(self, path, title=title, quantities=quantities, trails=trails)
-        return made
+        report_path: Path = report(self, path, title=title, quantities=quantities, trails=trails)
+        return report_path
 
     def _repr_html_(self) -> str:
         certificate = self.certificate

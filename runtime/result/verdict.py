@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from ..run.error_estimate import ANGLE
 
 #: Relative drift of energy or momentum up to which a run is trusted unless other bounds are asked.
-DRIFT = 1e-5
+DEFAULT_DRIFT = 1e-5
 
 #: Error up to which a run is trusted: rad of an angle, part of the motion of other coordinates.
-ACCURACY = ANGLE
+DEFAULT_ACCURACY = ANGLE
 
 
 @dataclass(frozen=True)
@@ -35,8 +35,8 @@ class Verdict:
 
     def __str__(self) -> str:
         if self.against:
-            more = len(self.against) - 1
-            others = f" (and {more} more, see below)" if more else ""
+            other_count = len(self.against) - 1
+            others = f" (and {other_count} more, see below)" if other_count else ""
             return f"NOT trusted: {_first_clause(self.against[0])}{others}"
         if self.missing:
             return f"not judged: {'; '.join(self.missing)}; nothing seen speaks against it"

@@ -13,16 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import EnvironmentFailure, SceneError
 
-from ..host.files import read_arrays, refuse_special, replacing
-from ..integrate.loop import Samples
+from ..integrate.c_loop import Samples
 from ..integrate.settings import Settings
-from ..kernels.identity import kernels_hash
+from ..kernels.kernel_fingerprint import kernels_hash
+from ..platform_support.safe_files import read_arrays, replace_atomically, require_regular_file
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
+    from ..engine.compiled_scene import CompiledScene
 
 State = Mapping[str, Any]
 
@@ -43,7 +43,9 @@ class Checkpoint:
     Raises EnvironmentFailure at once if its folder cannot be written.
     """
 
-    def __init__(self, path: Path, model: Compiled, settings: Settings, q: Array, u: Array) -> None:
+    def __init__(
+        self, path: Path, model: CompiledScene, settings: Settings, q: Array, u: Array
+    ) -> None:
         self.path = path
         folder = path.absolute().parent
         if not folder.is_dir() or not os.access(folder, os.W_OK):
@@ -61,7 +63,7 @@ class Checkpoint:
     def save(self, state: State, samples: Samples) -> None:
         """Write everything; the old file stays until the new one is whole."""
         rows = {name: getattr(samples, name) for name in _ROWS}
-        with replacing(self.path) as temporary, temporary.open("wb") as file:
+        with replace_atomically(self.path) as temporary, temporary.open("wb") as file:
             words = {key: np.array(text) for key, text in self.asked.items()}
             arrays: dict[str, Any] = {"format": np.array(_FORMAT), **state, **rows, **words}
             np.savez(file, **arrays)
@@ -71,7 +73,7 @@ class Checkpoint:
 
         SceneError if the file is no checkpoint, is damaged, or belongs to another run.
         """
-        refuse_special(self.path, "checkpoint")
+        require_regular_file(self.path, "checkpoint")
         try:
             data = read_arrays(self.path)
         except (FileNotFoundError, ValueError) as error:

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING
 from mstmm.errors import EnvironmentFailure, SceneError
 
 from ..integrate.steppers import get
-from .system import SceneCode
+from .scene_system import SceneCode
 
 if TYPE_CHECKING:
-    from ..engine.compiled import Compiled
-    from ..integrate.loop import Run
+    from ..engine.compiled_scene import CompiledScene
+    from ..integrate.c_loop import Integrator
     from ..integrate.settings import Settings
-    from ..kernels.fused import FusedLibrary
+    from ..kernels.fused_library import FusedLibrary
 
 #: Evaluations after which the length of a run is foretold.
 _LOOK_AFTER = 2000
@@ -28,7 +28,7 @@ _LOOK_AFTER = 2000
 LOOPED, FUSED = "looped", "fused"
 
 
-def at_once(model: Compiled, settings: Settings, recorded: str | None) -> SceneCode | None:
+def at_once(model: CompiledScene, settings: Settings, recorded: str | None) -> SceneCode | None:
     """SceneCode code for a run that starts now; None for the looped engine.
 
     Args:
@@ -52,20 +52,20 @@ def at_once(model: Compiled, settings: Settings, recorded: str | None) -> SceneC
     return None if library is None else _compiled(model, settings, library, math.inf)
 
 
-def for_many(model: Compiled, settings: Settings) -> SceneCode | None:
+def for_many(model: CompiledScene, settings: Settings) -> SceneCode | None:
     """Code for steps without a known end, compiled where it is worth it for any number of them."""
     library = model.fusion.ready(math.inf)
     return None if library is None else _compiled(model, settings, library, math.inf)
 
 
-def look_after(model: Compiled, settings: Settings) -> int:
+def look_after(model: CompiledScene, settings: Settings) -> int:
     """Steps of a looped run after which `worth_compiling` is to be asked; 0 for never."""
     if model.fusion.obstacle:
         return 0
     return math.ceil(_LOOK_AFTER / get(settings.first_method).n_stages)
 
 
-def worth_compiling(model: Compiled, settings: Settings, run: Run) -> SceneCode | None:
+def worth_compiling(model: CompiledScene, settings: Settings, run: Integrator) -> SceneCode | None:
     """SceneCode code if a looped run that has come so far is worth it."""
     gone = run.t - settings.t_start
     if not gone > 0.0:
@@ -76,7 +76,7 @@ def worth_compiling(model: Compiled, settings: Settings, run: Run) -> SceneCode 
 
 
 def _compiled(
-    model: Compiled, settings: Settings, library: FusedLibrary, evaluations: float
+    model: CompiledScene, settings: Settings, library: FusedLibrary, evaluations: float
 ) -> SceneCode:
     """Lanes only for methods that have use for them; what implicit methods ask once one does."""
     fusion, iterated = model.fusion, get(settings.first_method).iterated is not None

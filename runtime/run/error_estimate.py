@@ -18,10 +18,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 from ..integrate.settings import Settings
-from ..pack.layout import Layout
+from ..packing.coordinate_layout import Layout
 from .trajectory import Trajectory
 
 #: The estimate is this many times the difference of the two runs.
@@ -109,7 +109,7 @@ class ErrorEstimate:
         return {unit: float(v[within].max(initial=0.0)) for unit, v in values.items()}
 
 
-def tighter(first: Trajectory, breaks: Sequence[float] = ()) -> tuple[Settings, str]:
+def reference_settings(first: Trajectory, breaks: Sequence[float] = ()) -> tuple[Settings, str]:
     """Settings of the second run, sampled at the times of the first; and what to call it.
 
     `breaks` are the times (s) at which the scene ends every step.
@@ -156,7 +156,7 @@ def _size(values: Array) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def alike(first: Trajectory, second: Trajectory) -> bool:
+def made_same_steps(first: Trajectory, second: Trajectory) -> bool:
     """True if a second run made the very steps of the first one, so that it says nothing of it."""
     a, b = first.statistics, second.statistics
     counts = (a.steps, a.rejected, a.evaluations, a.smallest_step, a.largest_step)

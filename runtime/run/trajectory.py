@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.risk import Risk
 
-from ..integrate.loop import Statistics, Status
-from ..integrate.reached import ReachedError
+from ..integrate.achieved_error import AchievedError
+from ..integrate.c_loop import Statistics, Status
 from ..integrate.settings import Settings
-from .stretches import Stretch
+from .method_segments import MethodSegment
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,8 @@ class Trajectory:
     last: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
     risks: Iterable[Risk] = ()  # seen before the run and by it, which samples do not tell
-    methods: tuple[Stretch, ...] = ()  # of a run that chose among them
-    reached: ReachedError | None = None  # of a run that was asked for an error
+    methods: tuple[MethodSegment, ...] = ()  # of a run that chose among them
+    reached: AchievedError | None = None  # of a run that was asked for an error
     told: bool = True  # whether its risks are wanted among its warnings
     before: float = 0.0  # s of wall time that earlier processes spent on it, which no file keeps
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from mstmm.runtime.chart.trial import Runs
+from mstmm.runtime.chart.trial_run import Runs
 from mstmm.runtime.model.model import Model
 from mstmm.runtime.result.result import Result
 

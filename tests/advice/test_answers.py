@@ -12,11 +12,11 @@ from advice.scenes import TIP, hub_and_beam, period
 from chart.scenes import Clock, hub, pendulum
 
 import mstmm
-from mstmm.runtime.advice.advising import advised
-from mstmm.runtime.advice.evidence import evidence_of
+from mstmm.runtime.advice.advise import make_advice
+from mstmm.runtime.advice.error_predictors import evidence_of
 from mstmm.runtime.advice.request import request
-from mstmm.runtime.advice.trials import Span
-from mstmm.runtime.chart.budget import Budget
+from mstmm.runtime.advice.trial_models import ComparisonWindow
+from mstmm.runtime.chart.time_budget import Budget
 
 
 def test_nothing_to_reduce_is_an_answer() -> None:
@@ -121,7 +121,7 @@ def test_a_window_where_the_whole_run_takes_too_long() -> None:
     model = mstmm.compile(hub_and_beam("B", 2), engine="looped")
     asked = request(period("B"), 1e-2, TIP, 100.0, 51, 0)
     said: list[str] = []
-    made = advised(
+    made = make_advice(
         model, asked, lambda scene: mstmm.compile(scene, engine="looped"), lambda _: None,
         said.append, Budget(100.0, Clock(0.4)),
     )  # fmt: skip
@@ -131,11 +131,11 @@ def test_a_window_where_the_whole_run_takes_too_long() -> None:
 
 
 def test_errors_of_a_window_grow_with_time() -> None:
-    span = Span(0.5, 2.0)
+    span = ComparisonWindow(0.5, 2.0)
     assert not span.whole
     assert span.growth == 4.0
-    assert Span(2.0, 2.0).whole
-    assert np.isclose(Span(2.0, 2.0).growth, 1.0)
+    assert ComparisonWindow(2.0, 2.0).whole
+    assert np.isclose(ComparisonWindow(2.0, 2.0).growth, 1.0)
 
 
 def test_what_deflects_after_a_window() -> None:

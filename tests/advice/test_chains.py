@@ -11,10 +11,10 @@ from advice.scenes import tip
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice.renaming import renamed
-from mstmm.runtime.advice.rewriting import chains
-from mstmm.runtime.advice.rewriting.chains import short, written_out
-from mstmm.runtime.advice.rewriting.merging import merged
+from mstmm.runtime.advice.measure_renaming import rename_reference
+from mstmm.runtime.advice.scene_edits import chain_expansion
+from mstmm.runtime.advice.scene_edits.chain_expansion import expand_chains, short
+from mstmm.runtime.advice.scene_edits.weld_merging import merge_welds
 
 OF = "rope[last].tip.position"
 
@@ -57,13 +57,13 @@ NAMES = ["rope[0]", "rope[1].tip", "rope[3].tip", "rope[last].tip"]
 
 def test_written_out_it_is_the_same() -> None:
     scene = rope(4, {"law": {"stiffness": 3.0}}, {"law": {"damping": 0.1}}, **spoken_of())
-    found = written_out(scene, short(scene))
+    found = expand_chains(scene, short(scene))
     read = mstmm.Scene.from_data(tomllib.loads(found.scene.to_toml()))
     assert read.chain == ()
     assert read.event[0].when.text == "rope_3.tip.y + rope_2_hinge.q > 100"
     assert read.output[0].of.text == "rope_2.tip.y"
     assert read.load[0].axes == "rope_3"
-    after = places(read, [renamed(name, found.names) for name in NAMES])
+    after = places(read, [rename_reference(name, found.names) for name in NAMES])
     assert np.abs(places(scene, NAMES) - after).max() < 1e-12
 
 
@@ -73,29 +73,29 @@ def test_names_that_are_taken() -> None:
     pin = {"name": "rope_1_hinge", "type": "pin", "inboard": "rope[1].tip", "outboard": "rope_1"}
     given = rope(2, {}).model_dump(by_alias=True, exclude_none=True)
     scene = mstmm.Scene(**given | {"body": [*given["body"], bob], "hinge": [*given["hinge"], pin]})
-    found = written_out(scene, short(scene))
+    found = expand_chains(scene, short(scene))
     assert found.names["rope[1].tip"] == "rope_1_.tip"
     assert found.names["rope[1].hinge"] == "rope_1_hinge_"
     names = ["rope_1", "rope[last].tip"]
-    after = places(found.scene, [renamed(name, found.names) for name in names])
+    after = places(found.scene, [rename_reference(name, found.names) for name in names])
     assert np.abs(places(scene, names) - after).max() < 1e-12
 
 
 def test_welded_members_are_one() -> None:
     scene = rope(5, {"law": {"stiffness": 3.0}}, {"type": "fixed", "orientation": [0.3, 0, 0.2]})
-    found = merged(scene)
+    found = merge_welds(scene)
     assert found is not None
     read = mstmm.Scene.from_data(tomllib.loads(found.scene.to_toml()))
     assert [body.name for body in read.body] == ["rope_0", "rope_2", "rope_4"]
     assert read.hinge[0].inboard == "ground"
-    after = places(read, [renamed(name, found.names) for name in NAMES])
+    after = places(read, [rename_reference(name, found.names) for name in NAMES])
     assert np.abs(places(scene, NAMES) - after).max() < 1e-11
     assert found.still["post.top"] == (0.0, 1.0, 0.0)
 
 
 def test_a_chain_on_what_is_welded_to_the_ground_stays_one() -> None:
     scene = rope(3, {}, {"law": {"damping": 0.1}})
-    found = merged(scene)
+    found = merge_welds(scene)
     assert found is not None
     (chain,) = found.scene.chain
     assert (chain.inboard, chain.position) == ("ground", (0.0, 1.0, 0.0))
@@ -138,7 +138,7 @@ def test_dampers_of_some_members() -> None:
 
 
 def test_long_chains_stay_chains(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chains, "MOST", 2)
+    monkeypatch.setattr(chain_expansion, "MOST", 2)
     made = advised(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
     assert made.scene.chain[0].hinge[0].law.damping == (0.0,)
     stiff = advised(rope(3, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)

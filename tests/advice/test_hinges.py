@@ -9,9 +9,9 @@ import pytest
 from advice.scenes import sprung, tip
 
 import mstmm
-from mstmm.runtime.advice import advising, around, tables, telling
-from mstmm.runtime.advice.choice import RIGID, Choice
-from mstmm.runtime.advice.record import BodyAdvice
+from mstmm.runtime.advice import advice_summary, advise, scene_reduction, tables
+from mstmm.runtime.advice.advice import BodyAdvice
+from mstmm.runtime.advice.body_model_levels import RIGID, BodyModel
 
 OF = "d.tip.position"
 
@@ -46,7 +46,7 @@ def test_a_model_that_takes_longer_and_errs_more_is_not_advised(
 ) -> None:
     """Then the scene stays as it is, and a note tells what was found."""
     scene = sprung(3e5)
-    monkeypatch.setattr(telling, "compared", lambda *_: (0.89, 1.0))
+    monkeypatch.setattr(advice_summary, "compare_cpu_times", lambda *_: (0.89, 1.0))
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
     assert not made.reduced and made.changes == () and made.model_saving == 1.0
     assert mstmm.compile(made.scene, engine="looped").nu == mstmm.compile(scene).nu
@@ -104,7 +104,7 @@ def test_what_the_budget_leaves_no_time_for_is_named(monkeypatch: pytest.MonkeyP
     )
     assert small.scene == large.scene
     assert not any("limits this advice" in note for note in (*small.notes, *large.notes))
-    for module in (advising, around):
+    for module in (advise, scene_reduction):
         monkeypatch.setattr(module, "SEARCH", 0.0)
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
     note = next(note for note in made.notes if "limits this advice" in note)
@@ -117,7 +117,7 @@ def test_what_the_budget_leaves_no_time_for_is_named(monkeypatch: pytest.MonkeyP
 )
 def test_what_takes_longer_saves_nothing(saving: float, words: str) -> None:
     class One:
-        bodies = (BodyAdvice("arm", Choice(RIGID), Choice(RIGID), 0.0, saving, ""),)
+        bodies = (BodyAdvice("arm", BodyModel(RIGID), BodyModel(RIGID), 0.0, saving, ""),)
 
     head, _, rows = tables.bodies(One())  # type: ignore[arg-type]
     assert rows[0][-1] == words and "saves" not in head[-1]

@@ -12,8 +12,8 @@ from advice.scenes import TIP, hub_and_beam, period
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice.renaming import renamed
-from mstmm.runtime.advice.rewriting.merging import Merged, merged
+from mstmm.runtime.advice.measure_renaming import rename_reference
+from mstmm.runtime.advice.scene_edits.weld_merging import MergedScene, merge_welds
 
 
 def quaternion(rng: np.random.Generator) -> list[float]:
@@ -62,7 +62,7 @@ def run(scene: mstmm.Scene, quantity: str) -> NDArray[np.float64]:
 
 def test_the_same_motion(rng: np.random.Generator) -> None:
     scene = lumps(rng)
-    found = merged(scene)
+    found = merge_welds(scene)
     assert found is not None
     assert [body.name for body in found.scene.body] == ["p", "s"]
     assert found.into == {"q": "p", "r": "p", "t": "s"}
@@ -70,13 +70,13 @@ def test_the_same_motion(rng: np.random.Generator) -> None:
     for place in ("p.b", "q", "q.a", "r.b", "s.a", "t", "t.a"):
         for kind in ("position", "velocity", "orientation"):
             name = f"{place}.{kind}"
-            one, other = run(scene, name), run(loaded, renamed(name, found.names))
+            one, other = run(scene, name), run(loaded, rename_reference(name, found.names))
             assert np.abs(one - other).max() < 1e-9
 
 
-def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> Merged:
+def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> MergedScene:
     """The scene merged, which moves as it did and reads back from a file."""
-    found = merged(scene, keep)
+    found = merge_welds(scene, keep)
     assert found is not None
     read = mstmm.Scene.from_data(tomllib.loads(found.scene.to_toml()))
     ends = [f"{body.name}.{end}" for body in scene.body for end in body.ends]
@@ -85,7 +85,7 @@ def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> Merged:
         after = (
             np.tile(found.still[place], (len(before), 1))
             if place in found.still
-            else run(read, f"{renamed(place, found.names)}.position")
+            else run(read, f"{rename_reference(place, found.names)}.position")
         )
         assert np.abs(before - after).max() < 1e-9, place
     return found
@@ -160,7 +160,7 @@ def test_welded_to_the_ground(rng: np.random.Generator) -> None:
 def test_the_only_body_stays() -> None:
     weld = {"name": "weld", "type": "fixed", "inboard": "ground", "outboard": "p"}
     lone = lump(np.random.default_rng(1), "p")
-    assert merged(mstmm.Scene(gravity=[0, 0, 0], body=[lone], hinge=[weld])) is None
+    assert merge_welds(mstmm.Scene(gravity=[0, 0, 0], body=[lone], hinge=[weld])) is None
 
 
 def test_what_is_welded_to_the_ground_in_an_advice() -> None:
@@ -193,7 +193,7 @@ def test_what_is_welded_to_the_ground_in_an_advice() -> None:
 
 
 def test_nothing_to_merge() -> None:
-    assert merged(hub_and_beam("A")) is None  # the beam deforms
+    assert merge_welds(hub_and_beam("A")) is None  # the beam deforms
 
 
 def test_in_an_advice() -> None:

@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice.renaming import renamed
-from mstmm.runtime.advice.splitting import divisible, in_parts, unfit
-from mstmm.runtime.chart.models import at_level
+from mstmm.runtime.advice.beam_splitting import divisible, in_parts, unfit
+from mstmm.runtime.advice.measure_renaming import rename_reference
+from mstmm.runtime.chart.model_levels import at_level
 from mstmm.scene.tables.beam import Beam
 
 
@@ -54,7 +54,7 @@ def test_the_same_body(held: str, count: int) -> None:
     assert len(found.scene.beam) == count
     for name in ("beam.root", "beam.mid", "beam.tip", "bob"):
         one = place(at_level(whole, "rigid"), name)
-        other = place(at_level(found.scene, "rigid"), renamed(name, found.names))
+        other = place(at_level(found.scene, "rigid"), rename_reference(name, found.names))
         assert np.abs(one - other).max() < 1e-8
 
 
@@ -66,7 +66,10 @@ def test_the_same_bending() -> None:
     pin.pop("law")
     still = mstmm.Scene(**whole | {"hinge": [pin, whole["hinge"][1]]})
     found = in_parts(still, ["beam"], 3)
-    one, other = place(still, "beam.tip"), place(found.scene, renamed("beam.tip", found.names))
+    one, other = (
+        place(still, "beam.tip"),
+        place(found.scene, rename_reference("beam.tip", found.names)),
+    )
     bent = np.abs(one[:, 1]).max()
     assert bent > 5e-3
     assert np.abs(one - other).max() < 0.05 * bent

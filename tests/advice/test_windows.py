@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.advice import advising
-from mstmm.runtime.advice.trials import Span
+from mstmm.runtime.advice import advise
+from mstmm.runtime.advice.trial_models import ComparisonWindow
 
 BAR = {"name": "bar", "length": 1.0, "mass_per_length": 3.0, "bending_stiffness": 2e5}
 #: The run, and the window that a small budget would leave of it, s.
@@ -19,7 +19,7 @@ ERROR = 1e-3
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(advising, "probe", lambda *_: Span(WINDOW, T_END))
+    monkeypatch.setattr(advise, "probe", lambda *_: ComparisonWindow(WINDOW, T_END))
 
 
 def advised(**scene: Any) -> mstmm.Advice:

@@ -11,7 +11,7 @@ import pytest
 
 import mstmm
 from mstmm.atlas import cases
-from mstmm.atlas.page import number
+from mstmm.atlas.page import format_number
 from mstmm.errors import EnvironmentFailure, SceneError
 
 
@@ -21,7 +21,7 @@ from mstmm.errors import EnvironmentFailure, SceneError
      (3.4e-5, "3.4e-5"), (1e-10, "1e-10"), (8.0, "8"), (1234.5, "1.23e3"), (0.0, "0")],
 )  # fmt: skip
 def test_numbers_as_one_writes_them(value: float, shown: str) -> None:
-    assert number(value) == shown
+    assert format_number(value) == shown
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +67,7 @@ def test_a_picture_shows_both_methods_and_the_frontier(atlas: mstmm.Atlas) -> No
     (axes,) = figure.axes
     labels = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
     assert labels == [case.method, case.remedy, "no answer, or far above"]
-    assert f"fails at {number(case.fails_at)}" in [text.get_text() for text in axes.texts]
+    assert f"fails at {format_number(case.fails_at)}" in [text.get_text() for text in axes.texts]
     assert axes.get_title(loc="left") == case.title
 
 
@@ -75,7 +75,7 @@ def test_marks_that_stop_part_way_say_so() -> None:
     """The method was tried to 1e-3, the remedy a thousand times farther."""
     (case,) = mstmm.stability(["product-masses"], points=5, tolerance=0.3).cases
     words = [text.get_text() for text in case.plot().axes[0].texts]
-    assert f"tried to {number(min(at for at, _ in case.points))}" in words
+    assert f"tried to {format_number(min(at for at, _ in case.points))}" in words
     assert min(case.remedy_points)[0] < min(case.points)[0]
 
 
@@ -124,9 +124,11 @@ def test_progress_is_told() -> None:
 
 def test_cases_without_their_packages_are_left_out_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """And refused, with the way to get these, where they are asked for by name."""
-    definitions = {one.name: one for one in cases.chosen(["product-angle", "linear-elements"])}
-    monkeypatch.setattr(cases, "chosen", lambda wanted: tuple(definitions.values()))
-    monkeypatch.setattr("mstmm.atlas.definition.absent", lambda extra: ["skfem"])
+    definitions = {
+        one.name: one for one in cases.select_cases(["product-angle", "linear-elements"])
+    }
+    monkeypatch.setattr(cases, "select_cases", lambda wanted: tuple(definitions.values()))
+    monkeypatch.setattr("mstmm.atlas.case_definition.missing_packages", lambda extra: ["skfem"])
     found = mstmm.stability(points=3, tolerance=0.3).cases
     assert [case.name for case in found] == ["product-angle"]
     del definitions["product-angle"]

@@ -11,10 +11,10 @@ import pytest
 
 import mstmm
 from mstmm.atlas import cases
-from mstmm.atlas.case import Case
+from mstmm.atlas.case_plot import MeasuredCase
 
 #: Case -> between what its frontier is expected (in its unit), and how far the remedy must hold.
-#: From where not said otherwise: the growth of tests/stability/test_growth.py.
+#: From where not said otherwise: the growth of tests/robustness/test_growth.py.
 EXPECTED = {
     "product-length": ((16, 25), 1e5),
     "product-angle": ((80.0, 89.0), 90.0),
@@ -22,7 +22,7 @@ EXPECTED = {
     "product-masses": ((0.02, 0.2), 1e-6),
     # about 5e-13 times the ratio: 5e-5 at 1e8
     "product-root": ((1e5, 1e8), 1e20),
-    # errors of (0.4 to 4) 1e-16 times the ratio: tests/stability/test_mass_ratios.py
+    # errors of (0.4 to 4) 1e-16 times the ratio: tests/robustness/test_mass_ratios.py
     "heavy-tip": ((1e6, 1e9), 1e20),
     # refined up to four times, of the fifth power of that: as long as it leaves a digit
     "refined-tip": ((1e13, 1e17), 1e20),
@@ -134,17 +134,17 @@ POINTS, TOLERANCE = 7, 0.03
 
 
 @cache
-def measured(name: str) -> Case:
+def measured(name: str) -> MeasuredCase:
     return mstmm.stability([name], points=POINTS, tolerance=TOLERANCE).cases[0]
 
 
 def test_every_case_is_expected_somewhere() -> None:
-    assert set(EXPECTED) == set(cases.names())
+    assert set(EXPECTED) == set(cases.case_names())
 
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_the_method_fails_where_it_is_known_to(name: str) -> None:
-    case, (definition,) = measured(name), cases.chosen([name])
+    case, (definition,) = measured(name), cases.select_cases([name])
     low, high = EXPECTED[name][0]
     tried = dict(case.points)
     assert low <= min(case.holds_at, case.fails_at) <= max(case.holds_at, case.fails_at) <= high
@@ -167,7 +167,7 @@ def test_the_remedy_holds_there_and_beyond(name: str) -> None:
 
 @pytest.mark.parametrize("name", EXPECTED)
 def test_a_case_says_what_a_reader_needs(name: str) -> None:
-    (case,) = cases.chosen([name])
+    (case,) = cases.select_cases([name])
     assert case.name == name
     for text in (case.title, case.why, case.parameter, case.measured, case.source):
         assert len(text) > 5

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from atlas.test_cases import EXPECTED
 
-from mstmm.atlas.found import Found
-from mstmm.atlas.page import page
+from mstmm.atlas.case_result import CaseResult
+from mstmm.atlas.page import markdown_page
 
 FOLDER = Path(__file__).parents[2] / "docs" / "explanation" / "failures"
 AGAIN = "mstmm stability --out docs/explanation/failures writes it anew"
@@ -28,7 +28,7 @@ def test_every_case_is_on_the_page(kept: list[dict[str, Any]]) -> None:
 
 
 def test_the_page_says_what_the_data_do(kept: list[dict[str, Any]]) -> None:
-    text = page([Found(**case) for case in kept], pictures=True)
+    text = markdown_page([CaseResult(**case) for case in kept], pictures=True)
     assert (FOLDER / "atlas.md").read_text() == text, AGAIN
 
 

@@ -10,9 +10,9 @@ import pytest
 
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.families import every_method, without_twins
-from mstmm.runtime.chart.front import front, judged, recommended
-from mstmm.runtime.chart.point import Level, Point, Reference, Setting
+from mstmm.runtime.chart.chart_points import Level, Point, Reference, Setting
+from mstmm.runtime.chart.method_families import every_method, without_twins
+from mstmm.runtime.chart.pareto_front import bound_errors, front, recommend
 
 REFERENCE = Reference(1e-11, "two runs", "as given", "all coordinates", "1", "none")
 
@@ -29,7 +29,7 @@ def drawn(rng: np.random.Generator, curves: int = 6, settings: int = 8) -> tuple
             error = 10.0 ** round(rng.normal(-s - 1, 2), 1)
             seconds = 10.0 ** round(rng.normal(s / 4 - 3, 0.3), 1)
             found.append(Point(setting, error, seconds, 1))
-    return judged(found, REFERENCE)
+    return bound_errors(found, REFERENCE)
 
 
 def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> None:
@@ -66,9 +66,9 @@ def test_no_setting_is_surely_better_than_its_level_of_model() -> None:
     near = Point(Setting("genalpha", "one shape", 1e-3), 4e-3, 1e-3, 1)
     better = Point(Setting("genalpha", "two shapes", 1e-3), 4e-3, 2e-3, 1)
     reference = replace(REFERENCE, model="two shapes")
-    found = judged([near, better], reference, {"one shape": 5e-3})
+    found = bound_errors([near, better], reference, {"one shape": 5e-3})
     assert [point.sure_error for point in found] == [5e-3, 4e-3]
-    assert recommended(found, 4.5e-3, reference).model == "two shapes"
+    assert recommend(found, 4.5e-3, reference).model == "two shapes"
 
 
 def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.Generator) -> None:
@@ -79,9 +79,9 @@ def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.
             enough = [p for p in points if p.sure_error is not None and p.sure_error <= asked]
             if not enough:
                 with pytest.raises(NumericalFailure, match="no setting errs by at most"):
-                    recommended(points, asked, REFERENCE)
+                    recommend(points, asked, REFERENCE)
                 continue
-            best = recommended(points, asked, REFERENCE)
+            best = recommend(points, asked, REFERENCE)
             assert best in front(points, REFERENCE.floor)
             assert best.sure_error is not None and best.sure_error <= asked
             assert best.cpu_s == min(p.cpu_s or 0.0 for p in enough)
@@ -90,7 +90,7 @@ def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.
 
 
 def test_errors_that_the_reference_cannot_judge() -> None:
-    points = judged(
+    points = bound_errors(
         [
             Point(Setting("a", "m", 1e-9), 2e-12, 1e-3, 1),
             Point(Setting("b", "m", 1e-9), 1e-12, 1, 1),
@@ -99,25 +99,25 @@ def test_errors_that_the_reference_cannot_judge() -> None:
     )
     assert all(point.limited for point in points)
     assert [p.method for p in front(points, REFERENCE.floor)] == ["a"]  # b is no better, and slower
-    assert recommended(points, 3.1e-11, REFERENCE).method == "a"
+    assert recommend(points, 3.1e-11, REFERENCE).method == "a"
     with pytest.raises(NumericalFailure, match="cannot judge errors below 3"):
-        recommended(points, 1e-11, REFERENCE)
+        recommend(points, 1e-11, REFERENCE)
     for error in (0.0, -1.0, float("nan")):
         with pytest.raises(SceneError, match="above 0"):
-            recommended(points, error, REFERENCE)
+            recommend(points, error, REFERENCE)
 
 
 def test_what_never_changes_recommends_nothing() -> None:
     """As the origin of a body that turns about it."""
     exact = [Point(Setting("a", "m", 10.0**-i), 0.0, 1e-3, 1) for i in range(3)]
     with pytest.raises(NumericalFailure, match="no run errs at all in all coordinates"):
-        recommended(judged(exact, REFERENCE), 1e-3, REFERENCE)
+        recommend(bound_errors(exact, REFERENCE), 1e-3, REFERENCE)
     some = [*exact, Point(Setting("b", "m", 1e-2), 1e-5, 1e-3, 1)]
-    assert recommended(judged(some, REFERENCE), 1e-3, REFERENCE).error == 0.0
+    assert recommend(bound_errors(some, REFERENCE), 1e-3, REFERENCE).error == 0.0
 
 
 def test_json_says_why_nothing_is_recommended() -> None:
-    points = judged([Point(Setting("a", "m", 1e-3), 1e-2, 1e-3, 1)], REFERENCE)
+    points = bound_errors([Point(Setting("a", "m", 1e-3), 1e-2, 1e-3, 1)], REFERENCE)
     chart = Chart(
         "t", 1.0, 11, REFERENCE, points, (Level("m", 1e-11, 1, "looped"),), (), 1e-6, 10.0, 1.0
     )

@@ -10,7 +10,7 @@ from chart.scenes import hub, pendulum
 
 import mstmm
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.models import ladder, modes_of, reduced
+from mstmm.runtime.chart.model_levels import ladder, limit_modes, modes_of
 
 T_END, SAMPLES = 1.2, 13
 TIMES = np.linspace(0.0, T_END, SAMPLES)
@@ -91,7 +91,7 @@ def test_what_is_given_per_shape_goes_with_its_shapes() -> None:
         modes={"y": 2, "z": 2}, bending_stiffness=[30.0, 20.0], damping=[0.1, 0.2, 0.3, 0.4],
         initial={"eta": [1e-3, 2e-3, 3e-3, 4e-3]},
     )  # fmt: skip
-    one = reduced(scene, modes_of(scene), 1, stiffening=True).beam[0]
+    one = limit_modes(scene, modes_of(scene), 1, stiffening=True).beam[0]
     assert one.modes is not None and one.modes.counts == (1, 1, 0, 0)
     assert one.damping.ratio == (0.1, 0.3)
     assert one.initial.eta == (1e-3, 3e-3)

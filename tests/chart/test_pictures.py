@@ -16,11 +16,11 @@ from chart.scenes import hub, pendulum
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.drawing import decades, drawing, place, time_text
-from mstmm.runtime.chart.families import FAMILIES, every_method, family
-from mstmm.runtime.chart.looks import MARKS, mark_of, of_levels, of_methods
-from mstmm.runtime.chart.point import LeftOut, Point, Setting
-from mstmm.runtime.chart.tables import told
+from mstmm.runtime.chart.chart_points import Point, Setting, Skipped
+from mstmm.runtime.chart.method_families import FAMILIES, every_method, family
+from mstmm.runtime.chart.plot_elements import decades, drawing, place, time_text
+from mstmm.runtime.chart.plot_styles import MARKS, mark_of, of_levels, of_methods
+from mstmm.runtime.chart.tables import skip_reasons
 
 METHODS = ("dop853", "dopri5", "rodas4p2", "genalpha", "rk4")
 
@@ -228,17 +228,19 @@ def test_words_of_times() -> None:
 
 def test_reasons_are_told_once() -> None:
     entries = [
-        LeftOut("rk4", "rigid", "step 1 s and on", "no time", False),
-        LeftOut("rk4", "linear", "step 1 s and on", "no time", False),
-        LeftOut("dop853", "linear", "rtol 1e-05 and on", "no time", False),
-        LeftOut("auto", "rigid", "rtol 1e-04 and on", "no time", False),
-        LeftOut("auto", "linear", "rtol 1e-05 and on", "no time", False),
-        LeftOut("", "one-way", "", "no such level", True),
-        LeftOut("", "", "", "no rounds", False),
+        Skipped("rk4", "rigid", "step 1 s and on", "no time", False),
+        Skipped("rk4", "linear", "step 1 s and on", "no time", False),
+        Skipped("dop853", "linear", "rtol 1e-05 and on", "no time", False),
+        Skipped("auto", "rigid", "rtol 1e-04 and on", "no time", False),
+        Skipped("auto", "linear", "rtol 1e-05 and on", "no time", False),
+        Skipped("", "one-way", "", "no such level", True),
+        Skipped("", "", "", "no rounds", False),
     ]
-    assert told(entries, False) == [
+    assert skip_reasons(entries, False) == [
         "rk4, step 1 s and on (2 levels); dop853, rtol 1e-05 and on; auto (2 levels): no time",
         "no rounds",
     ]  # fmt: skip
-    assert told(entries, False, 1)[0] == "rk4, step 1 s and on (2 levels); and 2 more: no time"
-    assert told(entries, True) == ["one-way: no such level"]
+    assert (
+        skip_reasons(entries, False, 1)[0] == "rk4, step 1 s and on (2 levels); and 2 more: no time"
+    )
+    assert skip_reasons(entries, True) == ["one-way: no such level"]

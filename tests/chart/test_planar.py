@@ -9,8 +9,8 @@ import pytest
 
 import mstmm
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.models import Variant
-from mstmm.runtime.chart.planar import planar
+from mstmm.runtime.chart.model_levels import Variant
+from mstmm.runtime.chart.planar_model import planar
 
 BODY = {"name": "one", "mass": 1.0, "center_of_mass": [0.5, 0.1, 0], "inertia": [0.1, 0.2, 0.3],
         "ends": {"tip": [1, 0, 0]}}  # fmt: skip

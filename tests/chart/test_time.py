@@ -12,14 +12,14 @@ from chart.scenes import Clock, hub, pendulum, stiff
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.chart.budget import EARLY, REFERENCE, SETTINGS, Budget
+from mstmm.runtime.chart.build_chart import make_chart, request
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.charting import charted, request
-from mstmm.runtime.chart.point import Setting
-from mstmm.runtime.chart.trial import Runs
-from mstmm.runtime.host.interruptible import interruptible
-from mstmm.runtime.result.measure import Coordinates
-from mstmm.runtime.run.simulate import advance
+from mstmm.runtime.chart.chart_points import Setting
+from mstmm.runtime.chart.time_budget import EARLY, REFERENCE, SETTINGS, Budget
+from mstmm.runtime.chart.trial_run import Runs
+from mstmm.runtime.platform_support.interrupts import record_interrupts
+from mstmm.runtime.result.error_measure import Coordinates
+from mstmm.runtime.run.integration_run import advance
 
 METHODS = ("dop853", "dopri5", "rodas4")
 
@@ -35,7 +35,7 @@ def chart(seconds: float, each_run: float, said: list[str], rounds: int = 0) -> 
     model = mstmm.compile(pendulum(), engine="looped")
     asked = request(1.0, (), METHODS, False, 1e-3, seconds, 11, rounds)
     budget = Budget(seconds, clock)
-    return charted(model, asked, mstmm.compile, "", tell, said.append, budget)
+    return make_chart(model, asked, mstmm.compile, "", tell, said.append, budget)
 
 
 def test_the_budget_is_told_before_the_first_run() -> None:
@@ -109,11 +109,11 @@ def test_an_interrupt_within_a_short_run_is_heard(
     model = mstmm.compile(pendulum(), engine="looped")
 
     def signalled(*arguments: Any) -> Any:
-        with interruptible():  # as runs are, whose end comes first
+        with record_interrupts():  # as runs are, whose end comes first
             os.kill(os.getpid(), signal.SIGINT)
         return advance(*arguments)
 
-    monkeypatch.setattr("mstmm.runtime.run.execution.advance", signalled)
+    monkeypatch.setattr("mstmm.runtime.run.run_execution.advance", signalled)
     runs = Runs(1e-3, np.array([0.0, 1e-3]), Budget(1e9))
     with pytest.raises(KeyboardInterrupt):
         runs.trial(model, Setting("dop853", "as given", 1e-9), Coordinates(model), limit=1e9)

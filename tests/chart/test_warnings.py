@@ -13,8 +13,8 @@ from chart.test_front import REFERENCE
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.front import front, judged, recommended, shared
-from mstmm.runtime.chart.point import Point, Setting
+from mstmm.runtime.chart.chart_points import Point, Setting
+from mstmm.runtime.chart.pareto_front import bound_errors, front, recommend, split_warnings
 from mstmm.runtime.chart.tables import points, recommendation
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -63,11 +63,11 @@ def test_a_step_that_is_too_long_is_never_recommended() -> None:
     """However near the run came."""
     lucky = Point(Setting("rk4", "m", 0.1, True), 1e-6, 1e-4, 1, too_coarse=True)
     slow = Point(Setting("dop853", "m", 1e-6), 1e-6, 1e-3, 1)
-    found = judged([lucky, slow], REFERENCE)
+    found = bound_errors([lucky, slow], REFERENCE)
     assert [p.method for p in front(found)] == ["dop853"]
-    assert recommended(found, 1e-3, REFERENCE).method == "dop853"
+    assert recommend(found, 1e-3, REFERENCE).method == "dop853"
     with pytest.raises(NumericalFailure, match="longer than the fastest motion allows"):
-        recommended(found[:1], 1e-3, REFERENCE)
+        recommend(found[:1], 1e-3, REFERENCE)
 
 
 def test_what_is_recommended_is_told_with_its_warnings() -> None:
@@ -100,10 +100,10 @@ def test_what_some_runs_warn_of_stays_with_them() -> None:
         Point(Setting("a", "m", 10.0**-i), 1e-3, 1.0, 1, warnings=texts)
         for i, texts in enumerate((("x", "all"), ("all", "y"), ("all",)))
     ]
-    found, common = shared([*some, Point(Setting("a", "m", 1.0), failure="no")])
+    found, common = split_warnings([*some, Point(Setting("a", "m", 1.0), failure="no")])
     assert common == ("all",)
     assert [p.warnings for p in found] == [("x",), ("y",), (), ()]
-    assert shared(some[:1]) == ((some[0],), ())
+    assert split_warnings(some[:1]) == ((some[0],), ())
 
 
 def test_a_run_that_an_event_ends_is_told() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mstmm.derive.classical.harmonic_stiffness import beam_stiffness, rod_stiffness
-from mstmm.runtime.flexible.beam import kernels
+from mstmm.runtime.flexible.beam import beam_kernels
 
 #: On both sides of where the series ends, near poles, far out, and with damping.
 ZETA = [1e-9, 0.02, 4.99, 5.01, 5 + 0.3j, 500.0, 500.6, 1e3 + 100j, 628.3**4 * (1 - 0.02j), -50.0]
@@ -42,7 +42,7 @@ STATIC = {
 @pytest.mark.parametrize(("name", "closed"), [("harmonic_bending", beam), ("harmonic_rod", rod)])
 def test_the_kernels_in_double_precision(name: str, closed: Any) -> None:
     zeta = np.array([z for z in ZETA if closed is beam or abs(z) < 1e4], dtype=complex)
-    found = kernels.evaluate(name, {"zeta": np.stack([zeta.real, zeta.imag])})
+    found = beam_kernels.evaluate(name, {"zeta": np.stack([zeta.real, zeta.imag])})
     static = np.array(STATIC[name])
     upper = np.triu_indices(len(static))
     with mp.workdps(40):
@@ -57,7 +57,7 @@ def test_the_kernels_in_double_precision(name: str, closed: Any) -> None:
 
 @pytest.mark.parametrize("name", list(STATIC))
 def test_the_first_term_is_the_mass_of_polynomial_shapes(name: str) -> None:
-    found = kernels.evaluate(name, {"zeta": np.array([[1e-20], [0.0]])})["D_re"][:, 0] / -1e-20
+    found = beam_kernels.evaluate(name, {"zeta": np.array([[1e-20], [0.0]])})["D_re"][:, 0] / -1e-20
     cubic = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]])
     mass = cubic / 420 if name == "harmonic_bending" else np.array([[2, 1], [1, 2]]) / 6
     np.testing.assert_allclose(found, mass[np.triu_indices(len(mass))], rtol=1e-14)

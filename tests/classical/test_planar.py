@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.classical import forms
-from mstmm.runtime.run import classical
+from mstmm.runtime.classical import planar_and_spatial
+from mstmm.runtime.run import classical_run
 
 from .scenes import beam, rods, tree
 
@@ -51,20 +51,20 @@ def taken(monkeypatch: pytest.MonkeyPatch) -> list[bool]:
     """Whether each run was planar."""
     found: list[bool] = []
 
-    def form_of(*given: Any) -> forms.Form:
-        form = forms.form_of(*given)
+    def form_of(*given: Any) -> planar_and_spatial.Form:
+        form = planar_and_spatial.select_form(*given)
         found.append(form.planar)
         return form
 
-    monkeypatch.setattr(classical, "form_of", form_of)
+    monkeypatch.setattr(classical_run, "select_form", form_of)
     return found
 
 
 def in_space(monkeypatch: pytest.MonkeyPatch) -> None:
     def spatial(parts: Any, start: Any, gravity: Any, names: Sequence[str], size: float) -> Any:
-        return forms.Spatial(parts, names)
+        return planar_and_spatial.Spatial(parts, names)
 
-    monkeypatch.setattr(classical, "form_of", spatial)
+    monkeypatch.setattr(classical_run, "select_form", spatial)
 
 
 HINGES = ("fixed", "pin", "ball", "elastic")

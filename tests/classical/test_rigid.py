@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from reference.rods_index3 import tip
 
 import mstmm
-from mstmm.runtime.classical.records import Stepper
+from mstmm.runtime.classical.c_records import Stepper
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run import classical
+from mstmm.runtime.run import classical_run
 
 from .scenes import rods, spinning_rods, tree
 
@@ -128,7 +128,7 @@ def test_the_spatial_rods_converge_to_the_exact_tip() -> None:
 def test_one_iteration_fails_without_the_tangent_operator(monkeypatch: pytest.MonkeyPatch) -> None:
     assert spatial_run(0.02, "newmark").success
     assert spatial_run(0.01, "generalised-alpha", t_end=5.0).success
-    monkeypatch.setattr(classical, "Stepper", partial(Stepper, turning=False))
+    monkeypatch.setattr(classical_run, "Stepper", partial(Stepper, turning=False))
     lost = spatial_run(0.02, "newmark")
     assert not lost.success and "position gap" in lost.message
     assert not spatial_run(0.01, "generalised-alpha", t_end=5.0).success

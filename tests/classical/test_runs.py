@@ -12,7 +12,7 @@ from flexible import elastic_bar
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
 
 from .scenes import beam, rods, spinning_rods, tree
 

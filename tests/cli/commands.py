@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mstmm.cli.guard import run
+from mstmm.cli.error_boundary import run
 
 PENDULUM = """\
 gravity = [0, -9.81, 0]

@@ -21,7 +21,7 @@ def place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder / "cache"
 
 
-def filled(count: int) -> list[libraries.Built]:
+def filled(count: int) -> list[libraries.BuiltLibrary]:
     def recipe(i: int) -> libraries.Recipe:
         text = f"const int number = {i};\n"
         return libraries.Recipe("part", {"i": str(i)}, lambda key: {"p.c": text}, (), ("number",))
@@ -161,7 +161,7 @@ def test_doctor_survives_kernels_that_do_not_load(
     def broken() -> None:
         raise RuntimeError("symbol lookup error")
 
-    monkeypatch.setattr("mstmm.runtime.kernels.prebuilt.elements", broken)
+    monkeypatch.setattr("mstmm.runtime.kernels.prebuilt_kernels.elements", broken)
     done = mstmm("doctor", "--json")
     problems = [f for f in json.loads(done.out)["findings"] if not f["ok"]]
     assert done.code == 3 and any("symbol lookup" in f["text"] for f in problems)

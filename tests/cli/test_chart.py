@@ -80,8 +80,8 @@ def test_without_matplotlib(mstmm: Command, folder: Path, monkeypatch: pytest.Mo
     import mstmm.cli.studies.chart as command
     from mstmm.runtime.chart import chart as charts
 
-    monkeypatch.setattr(command, "missing", lambda _: ["matplotlib"])
-    monkeypatch.setattr(charts, "installed", lambda: False)
+    monkeypatch.setattr(command, "missing_packages", lambda _: ["matplotlib"])
+    monkeypatch.setattr(charts, "has_matplotlib", lambda: False)
     done = mstmm("chart", "pendulum.toml", "--out", "out", *QUICK)
     assert done.code == 0, done.err
     assert "no plot: it needs matplotlib: pip install 'mstmm[plot]'" in done.out

@@ -121,7 +121,7 @@ def test_generated_folder_that_is_out_of_date(
 def test_no_checkout_no_regeneration(
     mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mstmm.cli.generate._folder", lambda: folder / "generated")
+    monkeypatch.setattr("mstmm.cli.generate._generated_folder", lambda: folder / "generated")
     done = mstmm("generate")
     assert done.code == 3 and "clone" in done.err
 

@@ -10,7 +10,7 @@ from flexible import elastic_bar as bar
 
 import mstmm as package
 from cli.commands import Command
-from mstmm.runtime.flexible.elastic.bodies import save_matrices
+from mstmm.runtime.flexible.elastic.modal_elastic import save_matrices
 
 SCENE = """
 gravity = [0, 0, -9.81]

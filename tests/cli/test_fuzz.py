@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from cli.commands import PENDULUM
-from mstmm.cli.guard import run
+from mstmm.cli.error_boundary import run
 
 OPTIONS = [
     "--t-end", "--method", "--step", "--rtol", "--atol", "--times", "--output", "-o", "--plot",

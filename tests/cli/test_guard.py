@@ -14,8 +14,8 @@ import pytest
 
 from cli.commands import Command
 from mstmm import errors
-from mstmm.cli.explain import explain
-from mstmm.extras import missing
+from mstmm.cli.error_messages import message_and_code
+from mstmm.optional_packages import missing_package_error
 
 PROGRAM = [sys.executable, "-m", "mstmm"]
 
@@ -41,7 +41,7 @@ def program(folder: Path, *arguments: str, **options: Any) -> subprocess.Complet
     ],
 )
 def test_exit_codes(error: BaseException, code: int) -> None:
-    message, found = explain(error)
+    message, found = message_and_code(error)
     assert found == code and message
 
 
@@ -66,7 +66,7 @@ def test_errors_as_json(mstmm: Command) -> None:
 
 def test_help_is_quick_and_light(folder: Path) -> None:
     script = (
-        "import sys; from mstmm.cli.guard import run; code = run(['--help']);"
+        "import sys; from mstmm.cli.error_boundary import run; code = run(['--help']);"
         "print([m for m in ('numpy', 'scipy', 'sympy', 'pydantic', 'cffi') if m in sys.modules])"
     )
     done = subprocess.run(
@@ -167,19 +167,21 @@ def test_a_message_that_nobody_reads_does_not_change_the_exit_code(folder: Path)
 def test_a_lack_of_memory_is_no_defect(monkeypatch: pytest.MonkeyPatch) -> None:
     """Libraries fail in many ways where memory is short."""
     odd = RuntimeError("error in a library")
-    assert explain(odd)[1] == 1
+    assert message_and_code(odd)[1] == 1
     limits = resource.getrlimit(resource.RLIMIT_AS)
     pages = int(Path("/proc/self/statm").read_text().split()[0])
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + 2**24, limits[1]))
     try:
-        message, code = explain(odd)
+        message, code = message_and_code(odd)
     finally:
         resource.setrlimit(resource.RLIMIT_AS, limits)
     assert "not enough memory" in message and code == 3
 
 
 def test_a_package_that_does_not_load_is_told_from_one_that_is_missing() -> None:
-    broken = missing("io", "a file", ImportError("failed to map segment", name="xarray"))
+    broken = missing_package_error(
+        "io", "a file", ImportError("failed to map segment", name="xarray")
+    )
     assert "cannot be loaded (failed to map segment); give the process more memory" in str(broken)
-    absent = missing("io", "a file", ModuleNotFoundError("no", name="not_there"))
+    absent = missing_package_error("io", "a file", ModuleNotFoundError("no", name="not_there"))
     assert "not_there, which is not installed" in str(absent)

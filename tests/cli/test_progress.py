@@ -21,8 +21,8 @@ def test_work_without_a_measure_is_shown_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, stream: io.StringIO
 ) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
-    with progress.waiting("preparing the scene"):
+    monkeypatch.setattr(progress, "DISPLAY_DELAY", 0.0)
+    with progress.elapsed_time_display("preparing the scene"):
         while stream.isatty() and "0:00:0" not in stream.getvalue():
             time.sleep(0.01)
     assert ("preparing the scene" in stream.getvalue()) == stream.isatty()
@@ -31,7 +31,7 @@ def test_work_without_a_measure_is_shown_on_a_terminal(
 def test_short_work_is_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "PATIENCE", 1e6)
-    with progress.waiting("preparing the scene"):
+    monkeypatch.setattr(progress, "DISPLAY_DELAY", 1e6)
+    with progress.elapsed_time_display("preparing the scene"):
         pass
     assert stream.getvalue() == ""

@@ -14,7 +14,7 @@ import scipy.integrate
 import mstmm as package
 from cli.commands import PENDULUM, Command
 from mstmm.runtime.integrate import steppers
-from mstmm.runtime.run import second_opinion
+from mstmm.runtime.run import external_integrators
 
 
 def columns(path: Path) -> dict[str, list[float]]:
@@ -26,7 +26,12 @@ def columns(path: Path) -> dict[str, list[float]]:
 def test_the_listing_of_methods_names_every_method(mstmm: Command) -> None:
     assert "mstmm list methods" in " ".join(mstmm("simulate", "--help").out.split())
     listed = " ".join(mstmm("list", "methods").out.split())
-    for name in (*steppers.names(), *second_opinion.METHODS, "dttmm-classical-product", "auto"):
+    for name in (
+        *steppers.names(),
+        *external_integrators.METHODS,
+        "dttmm-classical-product",
+        "auto",
+    ):
         scipy, _, own = name.partition("scipy-")
         assert (own or scipy) in listed, name
 
@@ -136,7 +141,7 @@ def test_default_result_is_netcdf_beside_us(mstmm: Command, folder: Path) -> Non
 def test_without_the_extra_the_result_is_csv(
     mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mstmm.cli.extras.missing", lambda extra: ["h5netcdf"])
+    monkeypatch.setattr("mstmm.cli.extra_checks.missing_packages", lambda extra: ["h5netcdf"])
     assert mstmm("simulate", "pendulum.toml", "--t-end", "0.1").code == 0
     assert (folder / "pendulum.csv").is_file()
     refused = mstmm("simulate", "pendulum.toml", "-o", "x.nc")
@@ -326,7 +331,9 @@ def test_disk_too_full_for_netcdf(
     class Usage:
         free = 1000
 
-    monkeypatch.setattr("mstmm.runtime.result.output.storage.shutil.disk_usage", lambda path: Usage)
+    monkeypatch.setattr(
+        "mstmm.runtime.result.export.result_files.shutil.disk_usage", lambda path: Usage
+    )
     done = mstmm("simulate", "pendulum.toml", "--t-end", "0.1")
     assert done.code == 3 and "MB left" in done.err
     assert not list(folder.glob("*.nc")) and not list(folder.glob(".*.nc"))

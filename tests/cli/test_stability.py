@@ -57,9 +57,9 @@ def test_bad_input_is_told_in_a_line(mstmm: Command, folder: Path) -> None:
 def test_what_packages_are_missing_for_is_named(
     mstmm: Command, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    definitions = cases.chosen(["product-angle", "no-compression"])
-    monkeypatch.setattr(cases, "chosen", lambda wanted: definitions)
-    monkeypatch.setattr("mstmm.atlas.definition.absent", lambda extra: ["skfem"])
+    definitions = cases.select_cases(["product-angle", "no-compression"])
+    monkeypatch.setattr(cases, "select_cases", lambda wanted: definitions)
+    monkeypatch.setattr("mstmm.atlas.case_definition.missing_packages", lambda extra: ["skfem"])
     done = mstmm("stability", "--out", "found")
     assert done.code == 0, done.err
     assert "no-compression needs skfem: pip install 'mstmm[fem]'" in done.out + done.err

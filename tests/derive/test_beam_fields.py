@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 import sympy as sp
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.flexible import beam_fields
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
 
 Y, Z = sp.symbols("y z", real=True)
 WIDTH, HEIGHT, DENSITY = sp.Rational(3, 10), sp.Rational(1, 5), sp.Rational(7, 2)

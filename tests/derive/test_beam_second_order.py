@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 import sympy as sp
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.flexible import beam_second_order
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.flexible import beam_foreshortening
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
 
 from .test_beam_fields import DENSITY, Y, Z, over_rectangle, section
 
@@ -41,7 +41,7 @@ class Drawn:
 
     def second(self, kernel: str, output: str, **pairs: Any) -> sp.Matrix:
         """-1/2 sum_kl eta_k eta_l output_kl of a kernel; `pairs` are functions of k and l."""
-        ir = lower(beam_second_order.KERNELS[kernel](), kernel)
+        ir = lower(beam_foreshortening.KERNELS[kernel](), kernel)
         names = {port.name for port in ir.inputs}
         parts = []
         for k, other in PAIRS:

@@ -12,11 +12,11 @@ from support.dense_chain import Body, output_state, planar_body, random_body
 from support.sign_flips import Flip, flipped, flips
 
 from mstmm.derive.classical import body_planar, body_spatial
-from mstmm.derive.classical.state import PLANAR, SPATIAL
+from mstmm.derive.classical.state_vector import PLANAR, SPATIAL
+from mstmm.derive.definition.derivation import Derivation, Equation, tilde
+from mstmm.derive.definition.notation import Matrix, explicit
 from mstmm.derive.equations import newton_euler as ne
 from mstmm.derive.equations.mass_distribution import of_tensor
-from mstmm.derive.language.derivation import Derivation, Equation, tilde
-from mstmm.derive.language.notation import Matrix, explicit
 
 SPATIAL_KERNEL = kernel(body_spatial.derivation())
 PLANAR_KERNEL = kernel(body_planar.derivation())

@@ -21,8 +21,8 @@ from support.dense_chain import Array, Body, Joint, accelerations, planar_body, 
 from support.sign_flips import Flip, flipped, flips, terms
 
 from mstmm.derive.classical import (
-    acceleration,
-    ball,
+    acceleration_hinge,
+    ball_hinge,
     body_planar,
     body_spatial,
     hinge_relation,
@@ -31,9 +31,9 @@ from mstmm.derive.classical import (
 )
 from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.classical.hinge_relation import VANISHING_PIVOT, HingeStatement
-from mstmm.derive.language.notation import matrix_symbols
+from mstmm.derive.definition.notation import matrix_symbols
 from mstmm.ir import KernelIR
-from mstmm.ir.replay import GuardFailure
+from mstmm.ir.interpreter import GuardFailure
 
 SPATIAL_BODY = kernel(body_spatial.derivation())
 PLANAR_BODY = kernel(body_planar.derivation())
@@ -128,7 +128,7 @@ def acceleration_chain_error(
 ) -> float:
     """Acceleration hinges with offsets, bias and efforts along their free directions."""
     bodies = [random_body(rng) for _ in range(count)]
-    known = acceleration.SPATIAL_DIRECTIONS
+    known = acceleration_hinge.SPATIAL_DIRECTIONS
     indices = [known.index(name) for name in free]
     whole = [set(range(3)) <= set(indices), set(range(3, 6)) <= set(indices)]
     axes = [frame(rng) for _ in range(count + 1)]
@@ -185,14 +185,14 @@ def test_chain_of_hinges_against_dense(name: str, count: int, rng: np.random.Gen
 
 
 FREE = [
-    acceleration.SPATIAL_DIRECTIONS, ("x",), ("rz",), ("y", "rx"), ("x", "y", "z"),
+    acceleration_hinge.SPATIAL_DIRECTIONS, ("x",), ("rz",), ("y", "rx"), ("x", "y", "z"),
     ("rx", "ry", "rz"), ("x", "y", "rx", "ry", "rz"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("free", FREE, ids="-".join)
 def test_chain_of_acceleration_hinges(free: tuple[str, ...], rng: np.random.Generator) -> None:
-    hinge = kernel(acceleration.derivation(free))
+    hinge = kernel(acceleration_hinge.derivation(free))
     assert acceleration_chain_error(rng, 3, hinge, free) < 1e-11
 
 
@@ -204,8 +204,8 @@ def test_planar_acceleration_hinge_is_the_spatial_one(
     body = planar_body(rng)
     angle, next_angle = rng.normal(size=2)
     axes, next_axes = _turn(angle), _turn(next_angle)
-    spatial = kernel(acceleration.derivation(free))
-    planar = kernel(acceleration.derivation(free, planar=True))
+    spatial = kernel(acceleration_hinge.derivation(free))
+    planar = kernel(acceleration_hinge.derivation(free, planar=True))
     flat = np.array([1.0, 1, 0])
     values = {
         "A": axes, "d": rng.normal(size=3) * flat, "eta_v": rng.normal(size=3) * flat,
@@ -339,9 +339,9 @@ def test_margin_does_not_exceed_one(rng: np.random.Generator) -> None:
 
 STATEMENTS: dict[str, HingeStatement] = {
     "pin_spatial": pin_spatial.statement(),
-    "ball": ball.statement(),
+    "ball": ball_hinge.statement(),
     "pin_planar": pin_planar.statement(),
-    "acceleration": acceleration.statement(("y", "rx")),
+    "acceleration": acceleration_hinge.statement(("y", "rx")),
 }
 
 
@@ -386,7 +386,7 @@ def test_condition_count_must_match() -> None:
 @pytest.mark.parametrize("free", [(), ("x", "x"), ("theta",)])
 def test_unknown_directions_are_refused(free: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="free directions"):
-        acceleration.derivation(free)
+        acceleration_hinge.derivation(free)
 
 
 # --- growth of rounding errors ----------------------------------------------------------------

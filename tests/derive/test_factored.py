@@ -9,15 +9,15 @@ import mpmath
 import pytest
 import sympy as sp
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.audit.evaluate_equations import Undefined, evaluate_equations
-from mstmm.derive.audit.samples import rotation
 from mstmm.derive.catalogue.kernels import generic_kernels, hinge_kernels
 from mstmm.derive.catalogue.registry import builtin_elements
-from mstmm.derive.equations import screw
-from mstmm.derive.language.derivation import Derivation, Equation, Factor, Quantity, Triangular
-from mstmm.derive.language.element import Hinge
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.definition.derivation import Derivation, Equation, Factor, Quantity, Triangular
+from mstmm.derive.definition.element import Hinge
+from mstmm.derive.equations import screw_transport
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.equation_evaluation import Undefined, evaluate_equations
+from mstmm.derive.verification.kernel_evaluation import evaluate
+from mstmm.derive.verification.sample_points import random_rotation
 from mstmm.ir import KernelIR
 
 DIGITS = 40
@@ -159,11 +159,15 @@ def test_factored_elimination_of_unit_directions(name: str) -> None:
 
 
 def test_turn_by_trace_is_the_turn() -> None:
-    turn = lower(screw.turn(), "condense_turn")
-    by_trace = lower(screw.turn_by_trace(), "condense_turn_by_trace")
+    turn = lower(screw_transport.turn(), "condense_turn")
+    by_trace = lower(screw_transport.turn_by_trace(), "condense_turn_by_trace")
     numbers = random.Random(5)
     with mpmath.workdps(DIGITS):
-        given = {"Rc": rotation(numbers), "S": upper(definite(6, numbers)), "e": some(6, numbers)}
+        given = {
+            "Rc": random_rotation(numbers),
+            "S": upper(definite(6, numbers)),
+            "e": some(6, numbers),
+        }
         plain = evaluate(turn, given, DIGITS)
         traced = evaluate(by_trace, given, DIGITS)
         assert close(traced["S_I"], plain["S_I"])

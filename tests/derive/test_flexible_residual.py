@@ -9,8 +9,8 @@ T = 1/2 yd^T M(eta) yd with yd = [v; w; etad] is formed from the moments that th
 
 import sympy as sp
 
-from mstmm.derive.flexible import modal, section, symbols
-from mstmm.derive.language.derivation import Derivation
+from mstmm.derive.definition.derivation import Derivation
+from mstmm.derive.flexible import modal_residual, modal_symbols, section
 
 N = 2
 
@@ -72,8 +72,8 @@ _SYMMETRIC = ("Z_", "G_", "M", "K", "D")
 
 def _data() -> dict[str, sp.Matrix]:
     arrays = {}
-    for quantity in (*symbols.MOMENTS, symbols.STIFFNESS, symbols.DAMPING):
-        rows, columns = (N if x == symbols.N else int(x) for x in quantity.symbol.shape)
+    for quantity in (*modal_symbols.MOMENTS, modal_symbols.STIFFNESS, modal_symbols.DAMPING):
+        rows, columns = (N if x == modal_symbols.N else int(x) for x in quantity.symbol.shape)
         symmetric = quantity.name.startswith(_SYMMETRIC)
         arrays[quantity.name] = _explicit(quantity.name, rows, columns, symmetric)
     return arrays
@@ -83,7 +83,7 @@ def test_residual_is_that_of_its_energy() -> None:
     data = _data()
     v, w, a, wd = (_explicit(name, 3, 1) for name in ("v", "w", "a", "wd"))
     eta, etad, etadd = (_explicit(name, N, 1) for name in ("eta", "etad", "etadd"))
-    found = _evaluated(modal.momentum(), data | {"eta": eta, "etad": etad, "v": v, "w": w})
+    found = _evaluated(modal_residual.momentum(), data | {"eta": eta, "etad": etad, "v": v, "w": w})
     energy = found["T"][0, 0]
     speeds = [*v, *w, *etad]
     momenta = sp.Matrix([energy.diff(x) for x in speeds])
@@ -103,7 +103,7 @@ def test_residual_is_that_of_its_energy() -> None:
         + data["D"] * etad,
     )
     motion = sp.Matrix([*w, *wd, *a])
-    own = _evaluated(modal.residual(), data | {"eta": eta, "etad": etad, "motion": motion})
+    own = _evaluated(modal_residual.residual(), data | {"eta": eta, "etad": etad, "motion": motion})
     stated = sp.Matrix.vstack(
         own["e"] + own["S_rf"] * etadd, own["e_f"] + own["S_rf"].T * sp.zeros(6, 1)
     )
@@ -116,9 +116,9 @@ def test_rotation_of_a_section_and_its_rate_are_one_map() -> None:
     s = sp.Symbol("s", positive=True)
     exact = {1: sp.sin(sp.sqrt(s)) / sp.sqrt(s), 2: (1 - sp.cos(sp.sqrt(s))) / s}
     exact[3] = (sp.sqrt(s) - sp.sin(sp.sqrt(s))) / s ** sp.Rational(3, 2)
-    largest = section.LARGEST_TURN**2
+    largest = section.MAX_SECTION_ROTATION**2
     for first, function in exact.items():
-        gap = (section.series(first, s) - function).subs(s, largest)
-        slope = (section.series(first, s, derivative=True) - function.diff(s)).subs(s, largest)
+        gap = (section.even_series(first, s) - function).subs(s, largest)
+        slope = (section.even_series(first, s, derivative=True) - function.diff(s)).subs(s, largest)
         assert abs(sp.N(gap, 40)) < 1e-17
         assert abs(sp.N(slope, 40)) < 1e-16

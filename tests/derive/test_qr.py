@@ -9,14 +9,14 @@ import mpmath
 import pytest
 import sympy as sp
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.audit.evaluate_equations import evaluate_equations
-from mstmm.derive.audit.samples import rotation
 from mstmm.derive.catalogue.kernels import generic_kernels, kernels_of, qr_kernels
+from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, Triangle
 from mstmm.derive.elements.body_rigid import RigidBody
-from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Triangle
-from mstmm.derive.lower.kernel import lower
-from mstmm.ir.replay import GuardFailure
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.equation_evaluation import evaluate_equations
+from mstmm.derive.verification.kernel_evaluation import evaluate
+from mstmm.derive.verification.sample_points import random_rotation
+from mstmm.ir.interpreter import GuardFailure
 
 DIGITS = 40
 SPEEDS = (0, 1, 2, 3, 6)
@@ -177,7 +177,7 @@ def test_a_hinge_is_passed_as_by_the_riccati_sweep(
     if missing is not None and nu == 6 and not rotors:
         missing = None  # a free body of singular mass matrix has no accelerations
     given: Values = {
-        "Rc": rotation(numbers), "r": some(3, numbers), "H": some(6 * nu, numbers),
+        "Rc": random_rotation(numbers), "r": some(3, numbers), "H": some(6 * nu, numbers),
         "J": [numbers.uniform(0.5, 2.0) * rotors for _ in range(nu)], "floor": [0.0, 0.0],
         "U": rows(numbers, missing), "d": some(6, numbers), "e": some(6, numbers),
         "tau": some(nu, numbers), "U_P": rows(numbers), "d_P": some(6, numbers),

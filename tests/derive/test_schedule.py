@@ -10,20 +10,25 @@ from pathlib import Path
 import pytest
 
 import mstmm
-from mstmm.cli import stored
-from mstmm.derive.print.callers import DIRECT, POINTED, callees, calls_header
-from mstmm.derive.print.sweep import function_text, passes, sweep_files
-from mstmm.derive.schedule.slope import D, Sloped, ports_of
-from mstmm.derive.schedule.steps import Call, Pass, Step, call, inner
+from mstmm.cli import stored_elements
+from mstmm.derive.codegen.kernel_calls import (
+    NAMED_CALLEES,
+    POINTER_CALLEES,
+    collect_callees,
+    kernel_calls_header,
+)
+from mstmm.derive.codegen.sweep_text import all_passes, function_text, sweep_files
+from mstmm.derive.schedule.differentiated_passes import D, DifferentiatedCall, ports_of
+from mstmm.derive.schedule.pass_steps import Call, Pass, Step, call, inner
+from mstmm.derive.schedule.slot_definitions import CONSTANTS, ROLES, SLOTS, TRAITS
 from mstmm.derive.schedule.sweeps import SWEEPS
-from mstmm.derive.schedule.words import CONSTANTS, ROLES, SLOTS, TRAITS
 from mstmm.ir import KernelIR
 
-SPECS = stored.specs()
+SPECS = stored_elements.generated_specs()
 
 
 def steps() -> Iterator[Step]:
-    for whole in passes():
+    for whole in all_passes():
         for step in whole.steps:
             yield from inner(step)
 
@@ -35,11 +40,11 @@ def calls() -> list[Call]:
 def kernel_of(step: Call) -> KernelIR:
     """A kernel with the ports of the one that is called."""
     element, _, name = step.kernel.partition(".")
-    key = DIRECT.get(element, ("sweep", element))
+    key = NAMED_CALLEES.get(element, ("sweep", element))
     if element.startswith("generic{"):
         key = ("sweep", "generic6")
-    elif element in POINTED:
-        key, names = POINTED[element]
+    elif element in POINTER_CALLEES:
+        key, names = POINTER_CALLEES[element]
         name = names.get(name, name)
     return next(kernel for kernel in SPECS[key].kernels if kernel.name == name)
 
@@ -71,7 +76,7 @@ def test_every_slot_is_explained() -> None:
 def test_every_condition_is_explained() -> None:
     conditions = [step.when for step in steps()]
     conditions += [run.when for sweep in SWEEPS for run in sweep.runs]
-    conditions += [x for whole in passes() for x in (whole.skip, whole.spares_links)]
+    conditions += [x for whole in all_passes() for x in (whole.skip, whole.spares_links)]
     assert {word.lstrip("!") for when in conditions for word in when.split()} == TRAITS.keys()
 
 
@@ -80,7 +85,7 @@ def test_every_call_hands_over_every_port() -> None:
         kernel, ports = kernel_of(step), ports_of(step)
         names = {port.name for port in (*kernel.inputs, *kernel.outputs)}
         assert {port.name for port in kernel.inputs} <= ports.keys(), step
-        assert isinstance(step, Sloped) or ports.keys() <= names | {"work", "n"}, step
+        assert isinstance(step, DifferentiatedCall) or ports.keys() <= names | {"work", "n"}, step
 
 
 def test_slots_are_as_long_as_the_ports_that_meet_them() -> None:
@@ -130,8 +135,8 @@ def test_the_order_of_ports_may_change() -> None:
         assert found
         return " ".join(found[1].split())
 
-    assert handed(calls_header(SPECS)) == "to.A_I, to.x_I, to.Rc, to.r, to.A, to.x"
-    assert handed(calls_header(other)) == "to.r, to.Rc, to.x_I, to.A_I, to.A, to.x"
+    assert handed(kernel_calls_header(SPECS)) == "to.A_I, to.x_I, to.Rc, to.r, to.A, to.x"
+    assert handed(kernel_calls_header(other)) == "to.r, to.Rc, to.x_I, to.A_I, to.A, to.x"
     assert re.findall(r"\.A_I = [^,]*", sweep_files(other)["sweep_steps.c"]) == re.findall(
         r"\.A_I = [^,]*", sweep_files(SPECS)["sweep_steps.c"]
     )
@@ -141,7 +146,7 @@ def test_hinges_of_one_room_have_the_same_ports() -> None:
     pin = SPECS["hinge", "pin"]
     kernels = tuple(swapped(k) if k.name == "condense" else k for k in pin.kernels)
     with pytest.raises(ValueError, match="condense: not every element has the same ports"):
-        callees(SPECS | {("hinge", "pin"): replace(pin, kernels=kernels)})
+        collect_callees(SPECS | {("hinge", "pin"): replace(pin, kernels=kernels)})
 
 
 @pytest.mark.parametrize(
@@ -158,7 +163,7 @@ def test_hinges_of_one_room_have_the_same_ports() -> None:
 )  # fmt: skip
 def test_names_that_nobody_knows_are_not_printed(step: Call, said: str) -> None:
     with pytest.raises(ValueError, match=said):
-        function_text(Pass("wrong", "body", "", (step,)), callees(SPECS))
+        function_text(Pass("wrong", "body", "", (step,)), collect_callees(SPECS))
 
 
 def test_a_pass_is_printed_from_its_description_alone() -> None:
@@ -172,7 +177,7 @@ def test_a_pass_is_printed_from_its_description_alone() -> None:
         ),
         skip="idle", given=("given.T",),
     )  # fmt: skip
-    text = " ".join(function_text(whole, callees(SPECS)).split())
+    text = " ".join(function_text(whole, collect_callees(SPECS)).split())
     assert "mstmm_at_power_of_links(mstmm_state *state, int index, real *given_T)" in text
     assert "if (mstmm_idle(state->observed, body)) return 0;" in text
     assert "real v[3]; real P[1];" in text

@@ -8,29 +8,29 @@ from typing import Any
 import mpmath
 import pytest
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.audit.samples import Source
 from mstmm.derive.catalogue.kernels import Kernel, generic_kernels, screw_kernels
-from mstmm.derive.equations import screw
-from mstmm.derive.equations.sweep import DELTA, MOTION, PARENT_DELTA, PARENT_MOTION
-from mstmm.derive.language.derivation import Derivation
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.definition.derivation import Derivation
+from mstmm.derive.equations import screw_transport
+from mstmm.derive.equations.riccati_sweep import DELTA, MOTION, PARENT_DELTA, PARENT_MOTION
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
+from mstmm.derive.verification.sample_points import InputSampler
 from mstmm.ir import Assign, Constant, Element, KernelIR, Operand, Store, Temporary
 from mstmm.ir.graph import Graph, Node
 
 DIGITS = 40
-INPUTS = (screw.TURN, screw.SHIFT_ALONG)
+INPUTS = (screw_transport.TURN, screw_transport.SHIFT_ALONG)
 
 
 def motion(axis: str) -> Derivation:
     """Bias motion behind a screw, as the links have it."""
-    equations = screw.given(axis).behind(PARENT_MOTION.symbol, MOTION.symbol)
+    equations = screw_transport.screw_from_inputs(axis).behind(PARENT_MOTION.symbol, MOTION.symbol)
     return Derivation("screw", "motion", (*INPUTS, PARENT_MOTION), (MOTION,), equations)
 
 
 def delta(axis: str) -> Derivation:
     """Deviation behind a screw, as the links have it."""
-    equations = screw.given(axis).deviation(PARENT_DELTA.symbol, DELTA.symbol)
+    equations = screw_transport.screw_from_inputs(axis).deviation(PARENT_DELTA.symbol, DELTA.symbol)
     return Derivation("screw", "deviation", (*INPUTS, PARENT_DELTA), (DELTA,), equations)
 
 
@@ -38,7 +38,7 @@ SCREW = {kernel.name: kernel.ir() for kernel in screw_kernels()}
 SCREW |= {
     f"{step.__name__}_{axis}": lower(step(axis), step.__name__)
     for step in (motion, delta)
-    for axis in screw.AXES
+    for axis in screw_transport.AXES
 }
 RIGID: dict[str, Kernel] = {kernel.name: kernel for kernel in generic_kernels(0)}
 
@@ -51,7 +51,7 @@ NO_SPEEDS: Values = {name: [] for name in ("H", "J", "s", "tau", "G", "g")} | {"
 def drawn(seed: int) -> Values:
     """Screws about x and z, S, e, a motion and a deviation."""
     numbers = random.Random(seed)
-    source = Source("sweep", (), ())
+    source = InputSampler("sweep", (), ())
     inputs: Values = {}
     for name in ("condense_x", "motion_x", "delta_x"):
         for port in SCREW[name].inputs:

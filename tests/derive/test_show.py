@@ -10,22 +10,22 @@ import pytest
 import sympy as sp
 
 from mstmm.derive.classical.catalogue import CLASSICAL, classical_spec
-from mstmm.derive.classical.discrete.catalogue import FLEXIBLE
+from mstmm.derive.classical.discrete.catalogue import DISCRETE_DERIVATIONS
+from mstmm.derive.codegen.template_rendering import element_source
+from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from mstmm.derive.definition.notation import Matrix, Tilde, explicit
 from mstmm.derive.equations.rigid_body import rigid_body
-from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
-from mstmm.derive.language.notation import Matrix, Tilde, explicit
-from mstmm.derive.print.render import element_source
-from mstmm.derive.show.html import mathml
-from mstmm.derive.show.latex import latex
-from mstmm.derive.show.layout import layout
-from mstmm.derive.show.names import ShownName, shown_name, shown_unit
-from mstmm.derive.show.page import FORMATS, STAGES, ElementView, show, show_view
-from mstmm.derive.show.recognise import recognise
-from mstmm.derive.show.text import WIDTH, columns, wrapped
+from mstmm.derive.show.formula_layout import layout
+from mstmm.derive.show.latex import latex_text
+from mstmm.derive.show.mathml import mathml
+from mstmm.derive.show.plain_text import WIDTH, column_count, wrap_formula
+from mstmm.derive.show.show_page import FORMATS, STAGES, ElementView, show, show_view
+from mstmm.derive.show.symbol_names import SymbolName, parse_name, unit_text
+from mstmm.derive.show.vector_recognition import recognise_matrix
 from mstmm.errors import ElementError
 
 #: Acceleration form; tests/flexible/classical/test_show.py has the discrete-time form.
-NAMES = sorted(set(CLASSICAL) - set(FLEXIBLE))
+NAMES = sorted(set(CLASSICAL) - set(DISCRETE_DERIVATIONS))
 
 
 @cache
@@ -54,7 +54,7 @@ def test_text_fits_the_page_and_names_units_and_sources(name: str, at: str) -> N
     assert "source: Rui, Wang, Zhang" in text
     assert "N·m" in text and "m/s²" in text
     if at in ("equations", "matrix"):
-        assert max(columns(line) for line in text.splitlines()) <= WIDTH
+        assert max(column_count(line) for line in text.splitlines()) <= WIDTH
         assert re.search(r"\(5\.\d\d\)", text.split("\n", 6)[-1])
 
 
@@ -169,23 +169,23 @@ RECOGNISED = [
 @pytest.mark.parametrize("expression", RECOGNISED, ids=str)
 def test_vectors_are_found_again_in_explicit_matrices(expression: sp.MatrixExpr) -> None:
     spelled = explicit(expression)
-    found = recognise(spelled)
+    found = recognise_matrix(spelled)
     assert found is not None
     assert (explicit(found) - spelled).applyfunc(sp.expand) == sp.zeros(*spelled.shape)
 
 
 def test_parts_and_unrecognised_matrices() -> None:
     part = Matrix([LONG[i, 0] for i in range(3, 6)])
-    assert wrapped(layout(part), 0) == ["motion[4…6]"]
-    assert recognise(explicit(A) + Matrix([1, 0, 0])) is None
-    assert recognise(tilde(A) + sp.diag(1, 2, 3)) is None
+    assert wrap_formula(layout(part), 0) == ["motion[4…6]"]
+    assert recognise_matrix(explicit(A) + Matrix([1, 0, 0])) is None
+    assert recognise_matrix(tilde(A) + sp.diag(1, 2, 3)) is None
 
 
 def test_hidden_difference_is_not_recognised() -> None:
     """One wrong sign in a cross-product matrix keeps it explicit."""
     wrong = sp.Matrix(tilde(A))
     wrong[0, 1] = -wrong[0, 1]
-    assert recognise(wrong) is None
+    assert recognise_matrix(wrong) is None
 
 
 Q, T = sp.Function("q1"), sp.Symbol("t")
@@ -207,8 +207,8 @@ EXPRESSIONS = [
 @pytest.mark.parametrize(("expression", "text", "tex"), EXPRESSIONS, ids=lambda e: str(e)[:30])
 def test_expression_in_every_format(expression: sp.Basic, text: str, tex: str | None) -> None:
     node = layout(expression)
-    assert sorted("".join(wrapped(node, 0)).replace(" ", "")) == sorted(text.replace(" ", ""))
-    source = latex(node)
+    assert sorted("".join(wrap_formula(node, 0)).replace(" ", "")) == sorted(text.replace(" ", ""))
+    source = latex_text(node)
     assert_balanced(source)
     if tex is not None and not isinstance(expression, sp.Add):
         assert source.replace(" ", "") == tex.replace(" ", "")
@@ -217,8 +217,8 @@ def test_expression_in_every_format(expression: sp.Basic, text: str, tex: str | 
 
 def test_choice_has_branches_in_every_format() -> None:
     node = layout(sp.Piecewise((X, X < 1), (1, True)))
-    assert wrapped(node, 0) == ["⎧ x  if x < 1", "⎩ 1  otherwise"]
-    assert r"\begin{cases}" in latex(node)
+    assert wrap_formula(node, 0) == ["⎧ x  if x < 1", "⎩ 1  otherwise"]
+    assert r"\begin{cases}" in latex_text(node)
     assert "&lt;" in mathml(node)
 
 
@@ -236,7 +236,7 @@ def test_wide_choices_and_shared_terms_still_fit_the_page() -> None:
     )
     wide = ElementView("wide", "wide", (derivation,), tuple, str)
     text = show_view(wide, "equations", "text")
-    assert max(columns(line) for line in text.splitlines()) <= WIDTH
+    assert max(column_count(line) for line in text.splitlines()) <= WIDTH
     assert "c_1 = " in text and "otherwise" in text
     assert_balanced(show_view(wide, "equations", "latex"))
 
@@ -244,22 +244,22 @@ def test_wide_choices_and_shared_terms_still_fit_the_page() -> None:
 @pytest.mark.parametrize(
     ("name", "shown"),
     [
-        ("rdd_IO", ShownName("r", 2, "IO")),
-        ("omegadot", ShownName("omega", 1)),
-        ("thetadd_O", ShownName("theta", 2, "O")),
-        ("wd", ShownName("w", 1)),
-        ("q1", ShownName("q", 0, "1")),
-        ("F_scale", ShownName("F", 0, "scale")),
-        ("mass_matrix", ShownName("mass_matrix", upright=True)),
-        ("motion_I", ShownName("motion", 0, "I", upright=True)),
-        ("d", ShownName("d")),
+        ("rdd_IO", SymbolName("r", 2, "IO")),
+        ("omegadot", SymbolName("omega", 1)),
+        ("thetadd_O", SymbolName("theta", 2, "O")),
+        ("wd", SymbolName("w", 1)),
+        ("q1", SymbolName("q", 0, "1")),
+        ("F_scale", SymbolName("F", 0, "scale")),
+        ("mass_matrix", SymbolName("mass_matrix", upright=True)),
+        ("motion_I", SymbolName("motion", 0, "I", upright=True)),
+        ("d", SymbolName("d")),
     ],
 )
-def test_names(name: str, shown: ShownName) -> None:
-    assert shown_name(name) == shown
+def test_names(name: str, shown: SymbolName) -> None:
+    assert parse_name(name) == shown
 
 
 def test_units() -> None:
-    assert shown_unit("kg*m2") == "kg·m²"
-    assert shown_unit("m/s2") == "m/s²"
-    assert shown_unit("") == "–"
+    assert unit_text("kg*m2") == "kg·m²"
+    assert unit_text("m/s2") == "m/s²"
+    assert unit_text("") == "–"

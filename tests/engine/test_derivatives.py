@@ -16,11 +16,11 @@ from reference.tree import SIZES
 from support.complex_arithmetic import complex_step
 
 import mstmm
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR
 from mstmm.runtime.model.derivatives import Derivatives
-from mstmm.runtime.pack.internal import system_of
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.runtime.packing.fused_structure import structure_of
+from mstmm.runtime.packing.system_builder import system_of
 
 TIME = 0.3
 MOVING = tuple(name for name in SIZES if name != "fixed")

@@ -14,12 +14,12 @@ from reference.random_scenes import aligned_chain, random_state
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.numbers import rotations
-from mstmm.numbers.dual import Dual, atan2, hypot
-from mstmm.runtime.pack import parameters
-from mstmm.runtime.pack.internal import system_of
-from mstmm.runtime.pack.slopes import slopes
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.numerics import rotations
+from mstmm.numerics.dual import Dual, atan2, hypot
+from mstmm.runtime.packing import scene_parameters
+from mstmm.runtime.packing.fused_structure import structure_of
+from mstmm.runtime.packing.parameter_derivatives import slopes
+from mstmm.runtime.packing.system_builder import system_of
 
 TIME = 0.3
 #: Weights of the central difference of eighth order, for the steps 1 to 4.
@@ -54,7 +54,7 @@ class OtherStructure(Exception):
 def test_numbers_of_the_kernel_to_rounding(seed: int) -> None:
     """dp/dname for numbers drawn from those that are not zero, all hinge types in skew frames."""
     scene, _, _ = scene_of(400 + seed, most=2)
-    values = {name: x for name, x in parameters.read(scene).items() if x}
+    values = {name: x for name, x in scene_parameters.scene_parameters(scene).items() if x}
     names = np.random.default_rng(seed).permutation([n for n in values if "initial" not in n])
     checked = 0
     for name in names[:25]:
@@ -62,7 +62,9 @@ def test_numbers_of_the_kernel_to_rounding(seed: int) -> None:
 
         def shifted(change: float, name: str = name, size: int = len(p)) -> Array:
             try:
-                found = numbers(parameters.changed(scene, {name: values[name] + change}))
+                found = numbers(
+                    scene_parameters.with_parameters(scene, {name: values[name] + change})
+                )
             except SceneError:
                 raise OtherStructure from None
             if len(found) != size:
@@ -159,7 +161,7 @@ def test_numbers_inside_laws_loads_and_drives() -> None:
     found = model.derivatives(q, u, parameters=names)
     for name in names:
         step = 1e-5
-        full = parameters.resolved(model.scene, [name])[0]
+        full = scene_parameters.resolve_names(model.scene, [name])[0]
         value = model.parameters[full]
         ahead, behind = (
             model.with_parameters({name: value + s}).accelerations(q, u) for s in (step, -step)
@@ -282,11 +284,11 @@ def test_a_dual_is_no_float() -> None:
     [
         rotations.from_rpy,
         rotations.from_quaternion,
-        lambda v: [rotations.unit(v)],
-        lambda v: [rotations.perpendicular(v[1:])],
-        lambda v: [rotations.reject(v[:3], (v[1], v[0], 0.3))],
+        lambda v: [rotations.unit_vector(v)],
+        lambda v: [rotations.perpendicular_vector(v[1:])],
+        lambda v: [rotations.unit_rejection(v[:3], (v[1], v[0], 0.3))],
         lambda v: [[hypot(v), atan2(v[0], v[1]), rotations.norm(v[1:])]],
-        lambda v: rotations.about(v[:3], v[1]),
+        lambda v: rotations.rotation_about(v[:3], v[1]),
     ],
 )
 def test_rotations_of_duals(function: Any) -> None:

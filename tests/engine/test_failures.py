@@ -9,14 +9,16 @@ from types import SimpleNamespace
 from support.c_library import ENGINE, compile_library
 
 import mstmm
-from mstmm.border.failures import Failed
+from mstmm.abi.failure_codes import FailureCode
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_c_has_the_numbers_of_the_table(tmp_path: Path) -> None:
     """A macro of the engine's own with another value is an error of the compiler."""
-    asked = [f'_Static_assert(MSTMM_FAILED_{r.name} == {r.value}, "{r.name}");' for r in Failed]
+    asked = [
+        f'_Static_assert(MSTMM_FAILED_{r.name} == {r.value}, "{r.name}");' for r in FailureCode
+    ]
     source = tmp_path / "numbers.c"
     source.write_text("\n".join(['#include "sweep.h"', '#include "failures.h"', *asked, ""]))
     compile_library([source], tmp_path / "numbers.so", f"-I{ENGINE}", f"-I{ROOT / 'generated'}")
@@ -34,6 +36,7 @@ def test_every_reason_has_a_sentence_of_its_own() -> None:
     }]  # fmt: skip
     looped = mstmm.compile(mstmm.Scene(**tables)).looped
     said = {
-        looped.failure_text(SimpleNamespace(reason=int(r), element=0, code=1), 0.25) for r in Failed
+        looped.failure_text(SimpleNamespace(reason=int(r), element=0, code=1), 0.25)
+        for r in FailureCode
     }
-    assert len(said) == len(Failed) and all("at t = 0.25 s" in text for text in said)
+    assert len(said) == len(FailureCode) and all("at t = 0.25 s" in text for text in said)

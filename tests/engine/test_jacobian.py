@@ -9,7 +9,7 @@ from support.result_scenes import motor, pins, tree
 
 import mstmm
 from mstmm.runtime.engine import jacobian
-from mstmm.runtime.run.second_opinion import Equations
+from mstmm.runtime.run.external_integrators import Equations
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def test_the_exact_jacobian_is_the_differenced_one(
     """Along every component of q, u and the work, quaternions off the sphere included."""
     exact, y = equations(SCENES[name])
     found = exact.jacobian(0.2, y)
-    monkeypatch.setattr(jacobian, "MOST_BODIES", 0)
+    monkeypatch.setattr(jacobian, "MAX_BODIES", 0)
     differenced, _ = equations(SCENES[name])
     expected = differenced.jacobian(0.2, y)
     assert found.shape == (len(y), len(y)) and np.abs(found).max() > 0.1

@@ -17,7 +17,7 @@ from reference.jets import Array
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.tangent import Tangent
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 
 TIME, SHARE = 0.3, 1.0
 #: Efforts that drive themselves leave by themselves within the longer of these steps now and then.
@@ -38,13 +38,13 @@ def flexible(rng: Generator, planar: bool) -> tuple[Scene, Array, Array]:
     return engine_scenes.drawn(int(rng.integers(2**32)), planar, 3)
 
 
-def compiled(scene: Scene) -> tuple[mstmm.Model, Tangent]:
+def compiled(scene: Scene) -> tuple[mstmm.Model, TangentMatrix]:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    return model, Tangent(model.looped)
+    return model, TangentMatrix(model.looped)
 
 
 def differences(
-    tangent: Tangent, q: Array, u: Array, a: Array, direction: tuple[Any, ...]
+    tangent: TangentMatrix, q: Array, u: Array, a: Array, direction: tuple[Any, ...]
 ) -> Array:
     """Two central differences of the residual, extrapolated."""
 
@@ -77,7 +77,7 @@ def check_direction(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
     assert worst(tangent.slope(*direction), expected) < 1e-8
 
 
-def factored(tangent: Tangent) -> float:
+def factored(tangent: TangentMatrix) -> float:
     """The inverse step of the tangent that has been factored."""
     for step in INVERSE_STEPS:
         try:
@@ -88,7 +88,7 @@ def factored(tangent: Tangent) -> float:
     raise AssertionError("no step is short enough")
 
 
-def dense(tangent: Tangent, step: float) -> tuple[Array, Any]:
+def dense(tangent: TangentMatrix, step: float) -> tuple[Array, Any]:
     """The factored matrix from its directions, and which rows are equations."""
     columns = [
         tangent.slope(0.0, tangent.coordinates(unit), unit, step * unit)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 Scene = dict[str, Any]
 

@@ -12,7 +12,7 @@ from reference.random_scenes import random_scene
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.engine.tangent import Tangent
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 
 
 def compiled(scene: dict[str, Any]) -> mstmm.Model:
@@ -167,7 +167,7 @@ def test_a_release_is_refused() -> None:
 def carried(scene: dict[str, Any]) -> tuple[list[int], list[int]]:
     """Parents of the bodies, and where the tangent carries their S while they wait."""
     model = compiled(scene)
-    Tangent(model.looped)
+    TangentMatrix(model.looped)
     packed = model.looped.packed
     bodies = packed.model.bodies
     count = packed.system.count

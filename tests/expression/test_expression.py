@@ -10,7 +10,7 @@ import pytest
 from support.work import calls
 
 from mstmm.errors import ExpressionError
-from mstmm.expression.drive import value
+from mstmm.expression.drive import node_value
 from mstmm.expression.expression import Expression, Name, number, parse
 from mstmm.expression.parser import FUNCTIONS
 from mstmm.ir.graph import Graph, Node
@@ -63,7 +63,7 @@ def through_the_graph(expression: Expression) -> float:
         return graph.element(name.text)
 
     node = expression.build(graph, resolve)
-    return value(node, lambda leaf: VALUES[leaf.leaf.port])  # type: ignore[union-attr]
+    return node_value(node, lambda leaf: VALUES[leaf.leaf.port])  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize(("text", "expected"), MEANINGS)
@@ -309,7 +309,7 @@ def test_long_and_deep_texts_need_no_stack(text: str) -> None:
         expression, node = through(text)
     finally:
         sys.setrecursionlimit(limit)
-    assert value(node, lambda _: 0.5) == pytest.approx(
+    assert node_value(node, lambda _: 0.5) == pytest.approx(
         expression.evaluate(lambda _: 0.5), rel=1e-12, nan_ok=True
     )
     assert calls(lambda: through(text)) < 200 * len(text)  # at most 93 for each character

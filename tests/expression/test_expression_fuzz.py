@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mstmm.errors import ExpressionError
-from mstmm.expression.drive import value
+from mstmm.expression.drive import node_value
 from mstmm.expression.expression import parse
 from mstmm.ir.graph import Graph
 
@@ -82,7 +82,7 @@ def test_graph_and_direct_evaluation_agree(text: str, t: float, q: float) -> Non
     direct = expression.evaluate(lambda n: numbers[n.text])
     graph = Graph()
     node = expression.build(graph, lambda name: graph.element(name.text))
-    built = value(node, lambda leaf: numbers[leaf.leaf.port])  # type: ignore[union-attr]
+    built = node_value(node, lambda leaf: numbers[leaf.leaf.port])  # type: ignore[union-attr]
     assert math.isclose(direct, built, rel_tol=1e-9, abs_tol=1e-9), text
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from mstmm.runtime.flexible.bodies import modal_bodies
+from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.scene import Scene
 

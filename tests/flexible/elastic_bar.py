@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.elastic.bodies import elastic_bodies, model_of
 from mstmm.runtime.flexible.elastic.craig_bampton import Reduction, reduce
-from mstmm.runtime.flexible.elastic.model import ElasticModel
-from mstmm.runtime.flexible.elastic.ports import port
+from mstmm.runtime.flexible.elastic.finite_element_model import ElasticModel
+from mstmm.runtime.flexible.elastic.interface_nodes import port
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies, model_of
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 Array = NDArray[np.float64]

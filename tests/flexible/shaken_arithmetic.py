@@ -11,13 +11,13 @@ from typing import Any
 from numpy.random import Generator
 
 from mstmm.ir import OPERATIONS, Constant, KernelIR
-from mstmm.ir.replay import Doubles, run
+from mstmm.ir.interpreter import DoubleArithmetic, replay_kernel
 
 #: Relative size of the shaking; far above rounding, far below where the outputs bend.
 STEP = 1e-8
 
 
-class ShakenArithmetic(Doubles):
+class ShakenArithmetic(DoubleArithmetic):
     """Doubles of which every input and every result is moved by up to STEP, at random."""
 
     def __init__(self, rng: Generator) -> None:
@@ -39,4 +39,4 @@ class ShakenArithmetic(Doubles):
 
 def shaken(kernel: KernelIR, inputs: Mapping[str, Any], rng: Generator) -> dict[str, list[float]]:
     """The kernel's outputs from shaken inputs by shaken operations."""
-    return run(kernel, inputs, ShakenArithmetic(rng), None)
+    return replay_kernel(kernel, inputs, ShakenArithmetic(rng), None)

@@ -15,7 +15,7 @@ from flexible.reference.beam import flexible_body, mean_section
 from reference.compare import worst
 
 import mstmm
-from mstmm.runtime.flexible.bodies import modal_bodies
+from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 
 ACCURACY = 1e-10
 TIME = 0.3

@@ -15,11 +15,11 @@ from reference.jets import Array
 from support.complex_arithmetic import complex_step
 
 import mstmm
-from mstmm.bridge.fusion import Fusion, modes_at
 from mstmm.errors import SceneError
 from mstmm.ir import KernelIR
-from mstmm.ir.replay import evaluate_floats
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.ir.interpreter import evaluate_floats
+from mstmm.pipeline.fused_code import Fusion, mode_counts
+from mstmm.runtime.packing.fused_structure import structure_of
 
 AGREEMENT = 1e-13
 TIME = 0.3
@@ -216,7 +216,7 @@ def test_compiling_is_weighed_by_modes() -> None:
             {"gravity": [0, 0, 0], "beam": [beam], "body": [rod], "hinge": pins}, "looped"
         )
         fusion = Fusion(model.packed, {}, {})
-        counts.append(sorted(modes_at(fusion.structure)))
+        counts.append(sorted(mode_counts(fusion.structure)))
         least.append(fusion._break_even() * sum(1 + 2 * n for n in counts[-1]))
     assert counts == [[0, 0, 1, 1], [0, 0, 8, 8]]  # held section, rod, frame, tip
     assert least[1] > 1.5 * least[0]

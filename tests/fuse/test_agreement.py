@@ -13,8 +13,8 @@ from reference.jets import Array
 from reference.tree import SIZES
 
 import mstmm
-from mstmm.ir.replay import evaluate_floats
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.ir.interpreter import evaluate_floats
+from mstmm.runtime.packing.fused_structure import structure_of
 
 AGREEMENT = 1e-13
 TIME = 0.3

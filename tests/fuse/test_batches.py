@@ -10,7 +10,7 @@ from support.rod_scenes import chain, drawn_state
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.engine.states import many
+from mstmm.runtime.engine.state_evaluation import state_batch
 
 ENGINES = ("fused", "looped")
 HINGES = ["pin", "ball"]
@@ -31,8 +31,8 @@ def states(n: int) -> tuple[Any, Any]:
 @pytest.fixture
 def small_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Threads from a handful of states on."""
-    monkeypatch.setattr(many, "_LEAST_LANES", 16)
-    monkeypatch.setattr(many, "_LEAST_LOOPED", 8)
+    monkeypatch.setattr(state_batch, "_MIN_WORK_LANES", 16)
+    monkeypatch.setattr(state_batch, "_MIN_WORK_LOOPED", 8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -15,13 +15,13 @@ from numpy.random import Generator
 from reference.jets import Array
 
 import mstmm
-from mstmm.bridge.fusion import Fusion
 from mstmm.errors import EnvironmentFailure
-from mstmm.ir.replay import evaluate_floats
-from mstmm.runtime.engine.tangent import Tangent
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.ir.interpreter import evaluate_floats
+from mstmm.pipeline.fused_code import Fusion
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
+from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run.system import SceneSystem
+from mstmm.runtime.run.scene_system import SceneSystem
 
 Scene = dict[str, Any]
 
@@ -77,7 +77,7 @@ def check(scene: Scene, q: Array, u: Array, rng: Generator) -> None:
     assert worst(changes, looped.coordinates(answer, rho)) < 1e-11
 
 
-def condition(tangent: Tangent) -> float:
+def condition(tangent: TangentMatrix) -> float:
     """Of the tangent, its rows and columns scaled."""
     columns = [
         tangent.slope(0.0, tangent.coordinates(unit), unit, STEPS[0] * unit)
@@ -184,7 +184,7 @@ def test_without_a_compiler_the_looped_engine_serves(monkeypatch: pytest.MonkeyP
     def fails(*_: object, known: object = None) -> None:
         raise EnvironmentFailure("no compiler")
 
-    monkeypatch.setattr("mstmm.bridge.fusion.opened", fails)
+    monkeypatch.setattr("mstmm.pipeline.fused_code.open_cached_library", fails)
     assert model.simulate(0.01, method="genalpha", step=2e-3, certify=False).success
 
 

@@ -13,9 +13,9 @@ from reference.random_scenes import random_scene, random_state
 from support.result_scenes import rod
 
 import mstmm
-from mstmm.bridge.fusion import Fusion
-from mstmm.ir.replay import evaluate_floats
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.ir.interpreter import evaluate_floats
+from mstmm.pipeline.fused_code import Fusion
+from mstmm.runtime.packing.fused_structure import structure_of
 
 TIME = 0.3
 

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.fused_lab import COMPILERS
+from support.fused_helpers import COMPILERS
 from support.rod_scenes import chain, drawn_state
 
 import mstmm
-from mstmm.border import fused as fused_abi
-from mstmm.derive.print.scene import fused_sources
+from mstmm.abi import fused_library as fused_abi
+from mstmm.derive.codegen.scene_text import fused_sources
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.kernels.fused import Call, FusedLibrary, open_library
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.runtime.kernels.fused_library import FusedLibrary, SingleStateCall, open_library
+from mstmm.runtime.packing.fused_structure import structure_of
 
 KEY = "5" * 64
 MIXED = ["free", "pin", "ball", "prismatic"]
@@ -25,7 +25,7 @@ def compiled(text: str, folder: Path, compiler: str = COMPILERS[0]) -> Path:
     source, target = folder / "fused.c", folder / "fused.so"
     source.write_text(text)
     strict = ("-Wall", "-Wextra", "-Wmissing-prototypes", "-Werror")
-    command = [compiler, *fused_abi.FLAGS, *strict, "-fPIC", "-shared", str(source), "-lm"]
+    command = [compiler, *fused_abi.COMPILER_FLAGS, *strict, "-fPIC", "-shared", str(source), "-lm"]
     done = subprocess.run(
         [*command, "-o", str(target)], capture_output=True, text=True, check=False
     )
@@ -92,7 +92,7 @@ def test_prepared_calls(model: mstmm.Model, tmp_path: Path) -> None:
     _, p = structure_of(model.packed.system, model.known or {})
     library = open_library(compiled(text_of(model, "scalar"), tmp_path), KEY)
     q, u = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(3))
-    call = Call(library, p)
+    call = SingleStateCall(library, p)
     call.q[:], call.u[:] = q, u
     assert call() == 0
     first = call.udot.copy()
@@ -116,7 +116,7 @@ def test_files_that_are_no_such_library(model: mstmm.Model, tmp_path: Path) -> N
     empty.write_bytes(b"")
     refused(empty, KEY, "cannot be loaded")
     for name, old, new, match in (
-        ("older", f".abi = {fused_abi.ABI}", ".abi = 1", "layout 1, this mstmm has"),
+        ("older", f".abi = {fused_abi.ABI_VERSION}", ".abi = 1", "layout 1, this mstmm has"),
         ("other", fused_abi.SYMBOL, "something_else", "no fused library"),
     ):
         folder = tmp_path / name

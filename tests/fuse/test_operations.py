@@ -6,7 +6,7 @@ import itertools
 import math
 
 import pytest
-from support.fused_lab import COMPILERS, WIDTHS, FusedLab
+from support.fused_helpers import COMPILERS, WIDTHS, FusedLab
 
 from mstmm.ir import (
     OPERATIONS,
@@ -19,7 +19,7 @@ from mstmm.ir import (
     Store,
     Temporary,
 )
-from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.interpreter import evaluate_floats
 
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 3.0, 1e-310, 710.5, math.inf, -math.inf, math.nan)
 

@@ -13,11 +13,11 @@ from reference.random_scenes import random_scene, random_state
 from support.result_scenes import rod
 
 import mstmm
-from mstmm.bridge import fusion
-from mstmm.bridge.fusion import Fusion
 from mstmm.errors import SceneError
-from mstmm.ir.replay import evaluate_floats
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.ir.interpreter import evaluate_floats
+from mstmm.pipeline import fused_code
+from mstmm.pipeline.fused_code import Fusion
+from mstmm.runtime.packing.fused_structure import structure_of
 
 from .test_inverse import beams
 
@@ -67,7 +67,7 @@ def test_trees(seed: int) -> None:
 
 @pytest.fixture
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fusion, "_OFTEN", 1)
+    monkeypatch.setattr(fused_code, "_MIN_POINT_CALLS", 1)
 
 
 def machine() -> mstmm.Scene:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.fused_lab import COMPILERS, FusedLab
+from support.fused_helpers import COMPILERS, FusedLab
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.audit.rounding import rounding_bounds
-from mstmm.derive.print import parts, scene
+from mstmm.derive.codegen import function_splitting, scene_text
+from mstmm.derive.verification.rounding_bounds import rounding_bounds
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.graph import Graph
 
@@ -43,8 +43,8 @@ def lab(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     folder = tmp_path_factory.mktemp("lab")
     with pytest.MonkeyPatch.context() as patch:
         if size:
-            patch.setattr(scene, "WHOLE", 0)
-            patch.setattr(parts, "SIZE", size)
+            patch.setattr(scene_text, "MAX_UNSPLIT_SIZE", 0)
+            patch.setattr(function_splitting, "PART_SIZE", size)
         return FusedLab(folder, [*SMOOTH, *MIXED, guarded()], compiler)
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.border.scalars import SCALARS
-from mstmm.bridge.one_kernel import compile_kernel
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.abi.scalar_types import SCALARS
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Port
 from mstmm.ir.graph import Graph
-from mstmm.runtime.kernels.scalar import fractions
+from mstmm.pipeline.kernel_compilation import compile_kernel
+from mstmm.runtime.kernels.scalar_kernel import fractions
 
 JUMPS = ("sign", "floor", "lt", "le", "eq", "and", "or", "not", "select")
 SMOOTH = random_kernel("smooth", 3, 60, [op for op in OPERATIONS if op not in JUMPS])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from support.fused_lab import COMPILERS, WIDTHS, FusedLab
+from support.fused_helpers import COMPILERS, WIDTHS, FusedLab
 
 BOUND = 2.3e-16
 RANGE = 1200.0

@@ -12,11 +12,11 @@ import pytest
 from support.result_scenes import pins
 
 import mstmm
-from mstmm.bridge.fusion import MOST_ASKED, MOST_BODIES, Fusion, printers
 from mstmm.errors import SceneError
 from mstmm.ir import KernelIR
-from mstmm.runtime.pack.pack import pack
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.pipeline.fused_code import DEFAULT_MAX_BODIES, MAX_BODIES, Fusion, printer_files
+from mstmm.runtime.packing.fused_structure import structure_of
+from mstmm.runtime.packing.scene_packing import pack
 
 
 def chain(
@@ -132,7 +132,7 @@ def released() -> mstmm.Scene:
 
 
 def long() -> mstmm.Scene:
-    return chain(MOST_ASKED + 1, PLANAR, FULL, [0, -9.81, 0])
+    return chain(MAX_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
 
 
 @pytest.mark.parametrize(("scene", "reason"), [(released, "released"), (long, "bodies")])
@@ -146,9 +146,9 @@ def test_what_cannot_be_fused_says_why(scene: Any, reason: str) -> None:
 
 
 def test_scenes_too_large_for_auto_are_fused_when_asked_for() -> None:
-    large = chain(MOST_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
+    large = chain(DEFAULT_MAX_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
     assert "bodies" in mstmm.compile(large).engine_choice
-    assert not Fusion(pack(large), {}, {}, most=MOST_ASKED).obstacle
+    assert not Fusion(pack(large), {}, {}, most=MAX_BODIES).obstacle
 
 
 def test_contradictory_wishes_are_refused() -> None:
@@ -163,10 +163,10 @@ def test_contradictory_wishes_are_refused() -> None:
 
 def test_everything_that_prints_the_text_is_part_of_the_key() -> None:
     code = (
-        "import sys, mstmm.derive.fuse.scene, mstmm.derive.print.scene\n"
+        "import sys, mstmm.derive.fuse.scene_kernels, mstmm.derive.codegen.scene_text\n"
         "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('mstmm')))"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {Path(name).resolve() for name in found.stdout.split()}
-    missed = {path.name for path in loaded - {path.resolve() for path in printers()}}
-    assert missed <= {"__init__.py", "errors.py", "interrupts.py", "version.py"}
+    missed = {path.name for path in loaded - {path.resolve() for path in printer_files()}}
+    assert missed <= {"__init__.py", "errors.py", "signal_handling.py", "version.py"}

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import random
 
-from mstmm.graph.mechanism import GROUND, Edge, Mechanism, Rows
+from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph, RowGroup
 
 PIN = 2
 
 
-def pins(bodies: int, pairs: list[tuple[int, int]]) -> Mechanism:
+def pins(bodies: int, pairs: list[tuple[int, int]]) -> MechanismGraph:
     """A mechanism of pins, each (inboard body, outboard body)."""
-    return Mechanism(bodies, tuple(Edge(one, other, PIN) for one, other in pairs))
+    return MechanismGraph(bodies, tuple(Edge(one, other, PIN) for one, other in pairs))
 
 
-def four_bars(count: int) -> Mechanism:
+def four_bars(count: int) -> MechanismGraph:
     """Links on the ground side by side, each pair joined by a coupler."""
     pairs = [(GROUND, 0)]
     for coupler in range(1, 2 * count, 2):
@@ -22,7 +22,7 @@ def four_bars(count: int) -> Mechanism:
     return pins(2 * count + 1, pairs)
 
 
-def scissors(units: int) -> Mechanism:
+def scissors(units: int) -> MechanismGraph:
     """Crossed bars, each pair pinned in its middle and on both tips of the pair before."""
     pairs = [(GROUND, 0), (0, 1)]
     for bar in range(2, 2 * units, 2):
@@ -30,7 +30,7 @@ def scissors(units: int) -> Mechanism:
     return pins(2 * units, pairs)
 
 
-def ladder(rungs: int) -> Mechanism:
+def ladder(rungs: int) -> MechanismGraph:
     """Two rails of pinned pieces with a rung between each pair of pieces."""
     pairs = [(GROUND, 0)]
     for left in range(0, 3 * rungs, 3):
@@ -40,12 +40,12 @@ def ladder(rungs: int) -> Mechanism:
     return pins(3 * rungs, pairs)
 
 
-def ring(bodies: int) -> Mechanism:
+def ring(bodies: int) -> MechanismGraph:
     """One loop through the ground."""
     return pins(bodies, [(k - 1, k) for k in range(bodies)] + [(GROUND, bodies - 1)])
 
 
-def net(length: int, width: int) -> Mechanism:
+def net(length: int, width: int) -> MechanismGraph:
     """Bodies in rows, each pinned to the one before it and to the one beside it."""
     pairs = [(GROUND, 0)]
     for body in range(1, length * width):
@@ -54,7 +54,7 @@ def net(length: int, width: int) -> Mechanism:
     return pins(length * width, pairs)
 
 
-def drawn(seed: int) -> Mechanism:
+def drawn(seed: int) -> MechanismGraph:
     """A small mechanism with several loops, other rows between two to four bodies among them."""
     draw = random.Random(seed)
     count = draw.randint(3, 10)
@@ -70,7 +70,7 @@ def drawn(seed: int) -> Mechanism:
             edges.append(Edge(one, other, draw.choice((0, 2, 3, 4, 5, 6))))
     draw.shuffle(edges)
     others = tuple(
-        Rows(tuple(draw.sample(range(GROUND, count), draw.randint(2, 4))), draw.randint(1, 2))
+        RowGroup(tuple(draw.sample(range(GROUND, count), draw.randint(2, 4))), draw.randint(1, 2))
         for _ in range(draw.randint(0, 2))
     )
-    return Mechanism(count, tuple(edges), others)
+    return MechanismGraph(count, tuple(edges), others)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import product
 
-from mstmm.graph.mechanism import GROUND, Mechanism
+from mstmm.graph.mechanism_graph import GROUND, MechanismGraph
 
 Tree = tuple[int, ...]
 
 
-def inwards(mechanism: Mechanism, tree: Tree, body: int) -> list[int]:
+def inwards(mechanism: MechanismGraph, tree: Tree, body: int) -> list[int]:
     """A body, the body that holds it and so on to the ground."""
     way = [body]
     while way[-1] != GROUND:
@@ -20,7 +20,7 @@ def inwards(mechanism: Mechanism, tree: Tree, body: int) -> list[int]:
     return way
 
 
-def trees(mechanism: Mechanism) -> Iterator[Tree]:
+def trees(mechanism: MechanismGraph) -> Iterator[Tree]:
     """Every choice of one hinge for each body by which all hang on the ground."""
     holding = [
         [h for h, edge in enumerate(mechanism.hinges) if edge.outboard == body]
@@ -31,7 +31,7 @@ def trees(mechanism: Mechanism) -> Iterator[Tree]:
             yield tree
 
 
-def pending(mechanism: Mechanism, tree: Tree) -> list[set[int]]:
+def pending(mechanism: MechanismGraph, tree: Tree) -> list[set[int]]:
     """Per body the groups with some but not all ends among the bodies it holds, itself included."""
     ways = [set(inwards(mechanism, tree, body)) for body in range(mechanism.bodies)]
     groups: list[tuple[int, tuple[int, ...]]]
@@ -48,7 +48,7 @@ def pending(mechanism: Mechanism, tree: Tree) -> list[set[int]]:
     return found
 
 
-def work(mechanism: Mechanism, tree: Tree) -> int:
+def work(mechanism: MechanismGraph, tree: Tree) -> int:
     """The sum of m^2 + 3 m over the hinges of a tree, m the rows pending there."""
     first = len(mechanism.hinges)
     total = 0

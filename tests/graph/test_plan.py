@@ -9,9 +9,9 @@ from functools import partial
 import pytest
 from support.work import calls
 
-from mstmm.graph.degree import eliminated
-from mstmm.graph.mechanism import GROUND, Edge, Mechanism, Rows
-from mstmm.graph.plan import Plan, planned
+from mstmm.graph.closure_plan import ClosurePlan, closure_plan
+from mstmm.graph.mechanism_graph import GROUND, Edge, MechanismGraph, RowGroup
+from mstmm.graph.minimum_degree import elimination_order
 
 from . import reference
 from .mechanisms import drawn, four_bars, ladder, net, pins, ring, scissors
@@ -22,7 +22,7 @@ SEEDS = range(40)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rows_are_pending_from_their_ends_to_where_they_close(seed: int) -> None:
     mechanism = drawn(seed)
-    plan = planned(mechanism)
+    plan = closure_plan(mechanism)
     known = dict(enumerate((*plan.cut_of, *range(len(mechanism.hinges), 99))))
     found = [{known[group] for group in groups} for groups in plan.pending]
     drop = {hinge for hinge in plan.cut if mechanism.hinges[hinge].rows == 0}
@@ -39,7 +39,7 @@ def test_rows_are_pending_from_their_ends_to_where_they_close(seed: int) -> None
 def test_closings_come_before_what_they_need_is_gone(seed: int) -> None:
     """A body's closings come before those of every body nearer to the ground on its way."""
     mechanism = drawn(seed)
-    plan = planned(mechanism)
+    plan = closure_plan(mechanism)
     done: list[int] = []
     for closing in plan.closings:
         if closing.body != GROUND:
@@ -47,7 +47,7 @@ def test_closings_come_before_what_they_need_is_gone(seed: int) -> None:
         done.append(closing.body)
 
 
-def _stacked(plan: Plan, draw: random.Random) -> list[list[Fraction]]:
+def _stacked(plan: ClosurePlan, draw: random.Random) -> list[list[Fraction]]:
     """L of all groups as if each had one row: a sum of squares over the hinges they pass."""
     size = len(plan.groups)
     total = [[Fraction(0)] * size for _ in range(size)]
@@ -63,7 +63,7 @@ def _stacked(plan: Plan, draw: random.Random) -> list[list[Fraction]]:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_blocks_that_are_left_out_are_zero(seed: int) -> None:
     """Gauss' elimination in exact numbers, group by group in the order of the closings."""
-    plan = planned(drawn(seed))
+    plan = closure_plan(drawn(seed))
     matrix = _stacked(plan, random.Random(seed))
     left = set(range(len(plan.groups)))
     for closing in plan.closings:
@@ -78,7 +78,7 @@ def test_blocks_that_are_left_out_are_zero(seed: int) -> None:
 
 def test_the_ground_closes_a_row_of_four_bars_in_a_band() -> None:
     """Block tridiagonal: each group is coupled with at most one that closes later."""
-    plan = planned(four_bars(1000))
+    plan = closure_plan(four_bars(1000))
     assert {closing.body for closing in plan.closings} == {GROUND}
     assert max(len(closing.coupled) for closing in plan.closings) == 1
     assert len(plan.blocks) == 2 * 1000 - 1
@@ -86,53 +86,53 @@ def test_the_ground_closes_a_row_of_four_bars_in_a_band() -> None:
 
 @pytest.mark.parametrize("build", [scissors, ladder])
 def test_loops_away_from_the_ground_close_on_bodies(build: object) -> None:
-    plan = planned(build(50))  # type: ignore[operator]
+    plan = closure_plan(build(50))  # type: ignore[operator]
     assert GROUND not in {closing.body for closing in plan.closings}
     assert len({closing.body for closing in plan.closings}) == len(plan.cut)
 
 
 def test_a_ring_closes_once() -> None:
-    plan = planned(ring(9))
+    plan = closure_plan(ring(9))
     assert (plan.rows, plan.front, len(plan.closings)) == (2, 2, 1)
 
 
 def test_a_net_has_blocks_in_proportion_to_its_length() -> None:
-    short, long = (planned(net(length, 3)) for length in (40, 400))
+    short, long = (closure_plan(net(length, 3)) for length in (40, 400))
     assert len(long.blocks) < 11 * len(short.blocks)
 
 
 def test_minimum_degree_takes_the_leaves_of_a_star_first() -> None:
     couplings = [{1, 2, 3, 4}, {0}, {0}, {0}, {0}]
-    order = eliminated(range(5), couplings, [1] * 5)
+    order = elimination_order(range(5), couplings, [1] * 5)
     assert [group for group, _ in order] == [1, 2, 3, 0, 4]
     assert all(len(coupled) <= 1 for _, coupled in order)
 
 
 def test_groups_that_stay_are_coupled_by_those_that_go() -> None:
     couplings = [{1, 2}, {0}, {0}]
-    assert eliminated([0], couplings, [1, 1, 1]) == [(0, (1, 2))]
+    assert elimination_order([0], couplings, [1, 1, 1]) == [(0, (1, 2))]
     assert couplings[1] == {2} and couplings[2] == {1}
 
 
 def test_a_coupling_of_hinges_is_pending_from_its_hinges_inwards() -> None:
     """Gears on a carrier: the row closes on the carrier and passes both wheels' hinges."""
     hinges = tuple(Edge(*pair, 5) for pair in ((GROUND, 0), (0, 1), (0, 2)))
-    plan = planned(Mechanism(3, hinges, (Rows((0, 1, 0, 2), 1),)))
+    plan = closure_plan(MechanismGraph(3, hinges, (RowGroup((0, 1, 0, 2), 1),)))
     assert plan.pending == ((), (0,), (0,))
     assert [closing.body for closing in plan.closings] == [0]
 
 
 def test_a_cut_hinge_without_rows_needs_no_closing() -> None:
-    plan = planned(Mechanism(1, (Edge(GROUND, 0, 5), Edge(GROUND, 0, 0))))
+    plan = closure_plan(MechanismGraph(1, (Edge(GROUND, 0, 5), Edge(GROUND, 0, 0))))
     assert (plan.cut, plan.cut_of, plan.closings) == ((1,), (), ())
 
 
 def test_a_tree_has_nothing_to_close() -> None:
-    plan = planned(pins(3, [(GROUND, 0), (0, 1), (0, 2)]))
+    plan = closure_plan(pins(3, [(GROUND, 0), (0, 1), (0, 2)]))
     assert (plan.rows, plan.front, plan.work, plan.blocks) == (0, 0, 0, ())
 
 
 def test_a_plan_of_ten_times_the_loops_takes_ten_times_the_work() -> None:
     for build in (four_bars, scissors, ladder):
-        few, many = (calls(partial(planned, build(count))) for count in (30, 300))
+        few, many = (calls(partial(closure_plan, build(count))) for count in (30, 300))
         assert many < 12 * few

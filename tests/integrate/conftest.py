@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from support.integration_lab import Lab
+from support.integration_helpers import Lab
 
 
 @pytest.fixture(scope="session")

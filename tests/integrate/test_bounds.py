@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab
+from support.integration_helpers import Lab
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
 
 STARTS, LONGEST = [0.0, 3.0, 3.5, 4.0, 8.0], [np.inf, 0.5, 0.01, 0.25, 2.0]
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab, Problem
+from support.integration_helpers import Lab, Problem
 
-from mstmm.runtime.integrate.loop import Run, Status
+from mstmm.runtime.integrate.c_loop import Integrator, Status
 
 NEVER = 1e300
 IGNORE, RESTART, STOP, CONTINUE = 0, 1, 2, 3
@@ -24,7 +24,7 @@ def rotation(
     return problem
 
 
-def fired(run: Run) -> tuple[list[int], Any]:
+def fired(run: Integrator) -> tuple[list[int], Any]:
     """Events and times of the samples just after a change."""
     after = run.samples.event > 0
     return list(run.samples.event[after] - 1), run.samples.t[after]

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab, Problem
+from support.integration_helpers import Lab, Problem
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
 
 #: So tight that Newton's iteration leaves nothing to be seen beside the error of the step.

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab, Problem, same_bits
+from support.integration_helpers import Lab, Problem, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Run, Samples, Status
-from mstmm.runtime.integrate.settings import Settings, checked
+from mstmm.runtime.integrate.c_loop import Integrator, Samples, Status
+from mstmm.runtime.integrate.settings import Settings, validate
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
 
 ADAPTIVE = [name for name in IMPLICIT if get(name).adaptive]
@@ -302,7 +302,7 @@ def test_a_state_of_another_method_is_refused(lab: Lab) -> None:
     start = SYSTEMS["hanging"][1]
     state = hanging(lab).run("rodas4", 1.0, start).state()
     for method in ("rodas5p", "genalpha", "dop853"):
-        run: Run = hanging(lab).run(method, 1.0, start)
+        run: Integrator = hanging(lab).run(method, 1.0, start)
         with pytest.raises(SceneError, match="another scene, method or version"):
             run.restore(state)
 
@@ -315,5 +315,5 @@ def test_arguments_that_make_no_sense_are_named(lab: Lab) -> None:
         hanging(lab).run("wilson", 1.0, start)
     for radius in (-0.1, 1.5, math.nan):
         with pytest.raises(SceneError, match="radius"):
-            checked(Settings(1.0, method="genalpha", radius=radius))
-    assert checked(Settings(1.0, method="genalpha", radius=1)).radius == 1.0
+            validate(Settings(1.0, method="genalpha", radius=radius))
+    assert validate(Settings(1.0, method="genalpha", radius=1)).radius == 1.0

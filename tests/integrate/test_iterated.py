@@ -6,16 +6,16 @@ import dataclasses
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab, same_bits
+from support.integration_helpers import Lab, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Run, Status
+from mstmm.runtime.integrate.c_loop import Integrator, Status
 from mstmm.runtime.integrate.steppers import Tableau, get
 
 START = (1.0, 1.0)
 
 
-def runs(lab: Lab, tableau: Tableau, lanes: int) -> Run:
+def runs(lab: Lab, tableau: Tableau, lanes: int) -> Integrator:
     problem = lab.problem("mixed", 2)
     lab.lib.test_use_lanes(problem.system, problem.at, lanes)
     return problem.solved(tableau, 3.0, START, rtol=1e-9, atol=1e-11, output_times=[0.7, 1.9, 3.0])
@@ -64,7 +64,7 @@ def test_contradictory_blocks_are_refused() -> None:
 
 
 def test_another_number_of_lanes_is_another_run(lab: Lab) -> None:
-    def run(lanes: int) -> Run:
+    def run(lanes: int) -> Integrator:
         problem = lab.problem("mixed", 2)
         lab.lib.test_use_lanes(problem.system, problem.at, lanes)
         return problem.run("pirk13", 3.0, START, rtol=1e-9, atol=1e-11)

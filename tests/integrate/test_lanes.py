@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
-from support.integration_lab import Lab, Problem, same_bits
+from support.integration_helpers import Lab, Problem, same_bits
 
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
+from mstmm.runtime.integrate.c_tableau import c_tableau
 from mstmm.runtime.integrate.steppers import get
-from mstmm.runtime.integrate.tableau_in_c import c_tableau
 
 Array = NDArray[np.float64]
 TIMES = (0.0, 0.35, 1.0, 1.1, 2.0)

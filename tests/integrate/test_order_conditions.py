@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853, RK45
 
 from mstmm.runtime.integrate.steppers import Tableau, get
-from mstmm.runtime.integrate.steppers.implicit import Rosenbrock
+from mstmm.runtime.integrate.steppers.implicit_methods import Rosenbrock
 
 IMPLICIT = ("rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5")
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import RK23, solve_ivp
-from support.integration_lab import Lab
+from support.integration_helpers import Lab
 
-from mstmm.runtime.integrate.loop import Status
-from mstmm.runtime.integrate.steppers import Tableau, from_monomials, frozen, get
+from mstmm.runtime.integrate.c_loop import Status
+from mstmm.runtime.integrate.steppers import Tableau, from_monomials, get, to_read_only
 
 ARENSTORF = (0.994, 0.0, 0.0, -2.00158510637908252240537862224)
 PERIOD = 17.0652165601579625588917206249
@@ -194,12 +194,12 @@ def method_from_outside() -> Tableau:
     return Tableau(
         name="bogacki-shampine",
         order=3,
-        A=frozen(a),
-        B=frozen(RK23.B),
-        C=frozen(RK23.C),
+        A=to_read_only(a),
+        B=to_read_only(RK23.B),
+        C=to_read_only(RK23.C),
         dense=from_monomials(RK23.P),
         dense_order=3,
-        E=frozen(RK23.E),
+        E=to_read_only(RK23.E),
         error_order=2,
         source="Applied Mathematics Letters 2 (1989) 321-325",
     )

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 from support.c_library import compile_library
-from support.integration_lab import INTEGRATION
+from support.integration_helpers import INTEGRATION
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 
 @dataclass
@@ -42,13 +42,13 @@ class Moved:
 
 
 class Library:
-    """`phi.c` alone."""
+    """`phi_functions.c` alone."""
 
     def __init__(self, folder: Path) -> None:
         self.ffi: Any = cffi.FFI()
         lines = (INTEGRATION / "phi.h").read_text().splitlines()
         self.ffi.cdef("\n".join(line for line in lines if not line.startswith("#")))
-        target = compile_library([INTEGRATION / "phi.c"], folder / "phi.so", "-O2")
+        target = compile_library([INTEGRATION / "phi_functions.c"], folder / "phi.so", "-O2")
         self.lib: Any = self.ffi.dlopen(str(target))
         self.kept: list[Any] = []
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab, Problem, same_bits
+from support.integration_helpers import Lab, Problem, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Run, Samples, Status
+from mstmm.runtime.integrate.c_loop import Integrator, Samples, Status
 
 START = (1.0, 0.0)
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
@@ -35,7 +35,7 @@ def bouncing(lab: Lab) -> Problem:
     return problem
 
 
-def whole(lab: Lab, case: str) -> tuple[Samples, Run]:
+def whole(lab: Lab, case: str) -> tuple[Samples, Integrator]:
     method, options = CASES[case]
     run = bouncing(lab).solved(method, 1.5, START, **options)
     return run.samples, run
@@ -88,7 +88,7 @@ CONTINUE = """
 import sys
 import numpy as np
 from pathlib import Path
-from support.integration_lab import Lab
+from support.integration_helpers import Lab
 import test_restart as here
 
 folder = Path(sys.argv[1])

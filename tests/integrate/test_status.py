@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.integration_lab import Lab, same_bits
+from support.integration_helpers import Lab, same_bits
 
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Run, Status
+from mstmm.runtime.integrate.c_loop import Integrator, Status
 
 ADAPTIVE = ("dopri5", "dop853")
 
 
-def ended(run: Run, status: Status) -> str:
+def ended(run: Integrator, status: Status) -> str:
     """The message of a run that ends with `status` and stays ended."""
     assert run.advance(20.0) is status
     state, t = run.y, run.t

@@ -10,7 +10,7 @@ from scipy.integrate import DOP853, RK45
 
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate import steppers
-from mstmm.runtime.integrate.steppers import from_monomials, frozen
+from mstmm.runtime.integrate.steppers import from_monomials, to_read_only
 
 METHODS = ("rk4", "dopri5", "dop853", "pirk13")
 
@@ -76,10 +76,10 @@ def test_a_taken_name_is_refused() -> None:
 def test_contradictory_coefficients_are_refused() -> None:
     rk4 = steppers.get("rk4")
     cases = (
-        ({"C": frozen([0.0, 0.4, 0.5, 1.0])}, r"sum\(A"),
-        ({"B": frozen([0.5, 0.5, 0.5, 0.5])}, "= 1"),
-        ({"A": frozen(np.eye(4))}, "not explicit"),
-        ({"A": frozen(np.zeros((4, 3)))}, r"A is \(4, 3\), expected \(4, 4\)"),
+        ({"C": to_read_only([0.0, 0.4, 0.5, 1.0])}, r"sum\(A"),
+        ({"B": to_read_only([0.5, 0.5, 0.5, 0.5])}, "= 1"),
+        ({"A": to_read_only(np.eye(4))}, "not explicit"),
+        ({"A": to_read_only(np.zeros((4, 3)))}, r"A is \(4, 3\), expected \(4, 4\)"),
         ({"dense": from_monomials(np.ones((5, 2)))}, "dense output differs from"),
         ({"C": np.array([0.0, 0.5, 0.5, 1.0])}, "frozen"),
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 TESTS = Path(__file__).parents[1]
 #: Signals to this process, to one it started, and to a command.
 SENDERS = (
-    "host/test_apart.py::test_an_interrupt_ends_work_that_holds_the_lock",
+    "platform_support/test_subprocess_call.py::test_an_interrupt_ends_work_that_holds_the_lock",
     "libraries/test_many_processes.py::test_lock_and_compiler_end_with_their_killed_owner",
     "run/test_checkpoint.py::test_ctrl_c_in_the_second_run_costs_the_estimate_only",
     "interrupts/test_start.py::test_an_import_is_not_cut_off_unless_it_takes_long",

@@ -19,12 +19,12 @@ from cli.commands import Command
 
 import mstmm as library
 from mstmm import errors
-from mstmm.runtime.host import interruptible
-from mstmm.runtime.host.files import replacing
-from mstmm.runtime.integrate.loop import Status
-from mstmm.runtime.model import results
-from mstmm.runtime.result.output import tabled
-from mstmm.runtime.run import execution, simulate
+from mstmm.runtime.integrate.c_loop import Status
+from mstmm.runtime.model import run_results
+from mstmm.runtime.platform_support import interrupts
+from mstmm.runtime.platform_support.safe_files import replace_atomically
+from mstmm.runtime.result.export import csv_and_mat
+from mstmm.runtime.run import integration_run, run_execution
 
 RUN = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "a.csv", "--no-certify")
 KEPT = "the run is saved in a.csv.checkpoint; continue with the same command and --resume"
@@ -52,7 +52,7 @@ def test_a_result_that_cannot_be_saved(
         raise error
 
     with monkeypatch.context() as patch:
-        patch.setitem(tabled.TABLES, ".csv", fail)
+        patch.setitem(csv_and_mat.TABLES, ".csv", fail)
         done = mstmm(*RUN, *options)
     assert done.code == code and said in done.err and KEPT in done.err
     assert {path.name for path in folder.iterdir()} == {"pendulum.toml", "a.csv.checkpoint"}
@@ -61,7 +61,7 @@ def test_a_result_that_cannot_be_saved(
     with (folder / "a.csv.checkpoint").open("wb") as kept:
         np.savez(kept, **(data | {"seconds": np.array(5000.0)}))
     with monkeypatch.context() as patch:
-        patch.setattr(execution, "_advanced", fail)  # nothing is computed again
+        patch.setattr(run_execution, "_advanced", fail)  # nothing is computed again
         again = mstmm(*RUN, "--resume", "--json")
     assert again.code == 0 and json.loads(again.out)["seconds"] > 5000
     assert (folder / "a.csv").read_bytes() == whole
@@ -77,7 +77,7 @@ def test_an_interrupt_while_the_error_is_estimated(
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(results, "second_run", interrupt)
+        patch.setattr(run_results, "second_run", interrupt)
         done = mstmm(*RUN[:-1], "--certify", "--json")
     assert done.code == 130 and KEPT in json.loads(done.out)["error"]["message"]
     first = (folder / "a.csv").read_bytes()
@@ -90,9 +90,9 @@ def test_an_interrupt_while_the_error_is_estimated(
 WRITER = """
 import sys, time
 from pathlib import Path
-from mstmm.runtime.host.files import replacing
-from mstmm.runtime.integrate.loop import Status
-with replacing(Path(sys.argv[1])) as file:
+from mstmm.runtime.platform_support.safe_files import replace_atomically
+from mstmm.runtime.integrate.c_loop import Status
+with replace_atomically(Path(sys.argv[1])) as file:
     file.write_text("half")
     print("half", flush=True)
     time.sleep(600)
@@ -105,12 +105,12 @@ def test_leftovers_go_with_their_writer_and_not_before(tmp_path: Path) -> None:
         [sys.executable, "-c", WRITER, str(target)], stdout=subprocess.PIPE, text=True
     )
     assert writer.stdout is not None and writer.stdout.readline() == "half\n"
-    with replacing(tmp_path / "b.csv") as file:
+    with replace_atomically(tmp_path / "b.csv") as file:
         file.write_text("whole")
     assert len(list(tmp_path.iterdir())) == 3  # the other one is still at work
     writer.kill()
     writer.communicate()
-    with replacing(target) as file:
+    with replace_atomically(target) as file:
         file.write_text("whole")
     assert {path.name for path in tmp_path.iterdir()} == {"a[1].csv", "b.csv"}
     assert target.read_text() == "whole"
@@ -132,7 +132,7 @@ def test_a_file_is_on_the_disk_before_it_takes_its_name(
 
     monkeypatch.setattr(os, "fsync", noted_fsync)
     monkeypatch.setattr(Path, "replace", noted_replace)
-    with replacing(tmp_path / "a.csv") as file:
+    with replace_atomically(tmp_path / "a.csv") as file:
         file.write_text("whole")
     assert steps == ["sync", "name", "sync"]
 
@@ -140,7 +140,7 @@ def test_a_file_is_on_the_disk_before_it_takes_its_name(
 def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
     with (
         pytest.raises(errors.EnvironmentFailure, match="cannot be written"),
-        replacing(tmp_path / "none" / "a.csv") as file,
+        replace_atomically(tmp_path / "none" / "a.csv") as file,
     ):
         file.write_text("")
 
@@ -149,11 +149,11 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
 def test_a_run_that_does_not_look_is_left_by_the_second_interrupt(
     heard: None, monkeypatch: pytest.MonkeyPatch, which: signal.Signals
 ) -> None:
-    with interruptible.interruptible() as flag:
+    with interrupts.record_interrupts() as flag:
         for _ in range(3):
             signal.raise_signal(which)
         assert flag
-        monkeypatch.setattr(interruptible, "PATIENCE", -1.0)
+        monkeypatch.setattr(interrupts, "MAX_INTERRUPT_DELAY", -1.0)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(which)
     assert signal.getsignal(which) is signal.default_int_handler
@@ -164,8 +164,8 @@ def test_a_run_that_does_not_look_is_left_by_the_second_interrupt(
 def test_an_interrupt_that_nobody_hears_comes_again(heard: None, inner: bool, outer: bool) -> None:
     reached = False
     comes = nullcontext() if inner or outer else pytest.raises(KeyboardInterrupt)
-    with comes, interruptible.interruptible() as first:
-        with interruptible.interruptible() as second:
+    with comes, interrupts.record_interrupts() as first:
+        with interrupts.record_interrupts() as second:
             signal.raise_signal(signal.SIGINT)
             assert not inner or second
         reached = not outer or bool(first)
@@ -174,7 +174,7 @@ def test_an_interrupt_that_nobody_hears_comes_again(heard: None, inner: bool, ou
 
 
 def test_an_interrupt_comes_again_behind_an_error(heard: None) -> None:
-    with pytest.raises(KeyboardInterrupt) as caught, interruptible.interruptible():
+    with pytest.raises(KeyboardInterrupt) as caught, interrupts.record_interrupts():
         signal.raise_signal(signal.SIGINT)
         raise ValueError
     assert isinstance(caught.value.__context__, ValueError)
@@ -184,12 +184,12 @@ def test_a_run_that_ends_by_itself_hands_an_interrupt_on(
     heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A program of many short runs ends by Ctrl-C, which none of them has the time to hear."""
-    model, advance = library.compile(pendulum(), engine="looped"), simulate.advance
+    model, advance = library.compile(pendulum(), engine="looped"), integration_run.advance
 
     def signalled(*arguments: Any) -> Status | None:
         signal.raise_signal(signal.SIGINT)
         return advance(*arguments)
 
-    monkeypatch.setattr(execution, "advance", signalled)
+    monkeypatch.setattr(run_execution, "advance", signalled)
     with pytest.raises(KeyboardInterrupt):
         model.simulate(1e-3)

@@ -55,8 +55,8 @@ def test_an_import_is_not_cut_off_unless_it_takes_long(
     )
     program = (
         "import sys; sys.argv[0] = 'mstmm'\n"
-        f"import mstmm.interrupts; mstmm.interrupts._IMPORT = {patience}\n"
-        "mstmm.interrupts.raise_in_the_command()\n"
+        f"import mstmm.signal_handling; mstmm.signal_handling._MAX_IMPORT_WAIT = {patience}\n"
+        "mstmm.signal_handling.raise_on_signal()\n"
         "try:\n    import library\n    while True: pass\n"
         "except KeyboardInterrupt: print('then interrupted')"
     )
@@ -71,7 +71,7 @@ def test_an_ignored_interrupt_is_ignored_from_the_start(heard: None) -> None:
     script = "trap '' INT; exec \"$@\""
     program = (
         "import signal, sys; sys.argv[0] = 'mstmm'\n"
-        "import mstmm.interrupts as found\n"
+        "import mstmm.signal_handling as found\n"
         "print(signal.getsignal(signal.SIGINT) is signal.SIG_IGN,"
         " callable(signal.getsignal(signal.SIGTERM)))"
     )
@@ -85,7 +85,7 @@ def test_an_ignored_interrupt_is_ignored_from_the_start(heard: None) -> None:
 def test_a_library_leaves_signals_alone() -> None:
     program = (
         "import signal; before = [signal.getsignal(n) for n in (2, 15)]\n"
-        "import mstmm, mstmm.runtime.run.simulate\n"
+        "import mstmm, mstmm.runtime.run.integration_run\n"
         "print(before == [signal.getsignal(n) for n in (2, 15)])"
     )
     done = subprocess.run(

@@ -19,9 +19,9 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from mstmm import interrupts
-from mstmm.cli import guard
-from mstmm.runtime.run import execution, simulate
+from mstmm import signal_handling
+from mstmm.cli import error_boundary
+from mstmm.runtime.run import integration_run, run_execution
 
 #: Events of Python's audit that are steps of files, each told before it happens.
 STEPS = {"open", "os.rename", "os.remove", "os.truncate", "os.chmod", "fcntl.flock"}
@@ -85,12 +85,12 @@ def child(kill: dict[str, Any], count: mmap.mmap) -> None:
         os.dup2(handle, number)
     for each in SIGNALS:
         signal.signal(each, signal.SIG_IGN if each in kill["ignored"] else signal.SIG_DFL)
-    execution.CHECKPOINT_EVERY = simulate.SLICE = kill["pace"]
-    interrupts.end_at_once()
+    run_execution.CHECKPOINT_EVERY = integration_run.SLICE = kill["pace"]
+    signal_handling.exit_on_signal()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)  # what comes too early waits until here
     countdown = Countdown(kill["signal"], kill["at"], kill["every"], count)
     getattr(countdown, f"on_{kill['points']}")()
-    guard.leave(kill["arguments"])
+    error_boundary.run_and_exit(kill["arguments"])
 
 
 def main() -> None:
@@ -120,6 +120,6 @@ def main() -> None:
 
 if __name__ == "__main__":
     sys.stdout.reconfigure(line_buffering=True)  # type: ignore[union-attr]
-    guard.run(["simulate", *sys.argv[1:]])  # loads all that a command needs
+    error_boundary.run(["simulate", *sys.argv[1:]])  # loads all that a command needs
     print(json.dumps({"ready": True}), flush=True)
     main()

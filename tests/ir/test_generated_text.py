@@ -15,18 +15,18 @@ import pytest
 from support.c_library import build, compile_library
 from support.random_kernels import element, random_kernel
 
-from mstmm.border import elements as abi
-from mstmm.derive.print.kernel import comment, literal, string
-from mstmm.derive.print.render import (
+from mstmm.abi import element_library as abi
+from mstmm.derive.codegen.kernel_text import comment_text, literal_text, string_literal
+from mstmm.derive.codegen.template_rendering import (
     element_source,
     generated_files,
     registry_source,
     write_generated,
 )
 from mstmm.ir import Assign, Constant, Guard, KernelIR, Port, Store, Temporary
+from mstmm.ir.element_spec import ElementSpec, Param
 from mstmm.ir.graph import Graph
-from mstmm.ir.spec import ElementSpec, Param
-from mstmm.ir.stored import element_from_json, element_to_json
+from mstmm.ir.json_format import element_from_json, element_to_json
 
 SPEC = element("drawn", random_kernel("first", 1), random_kernel("second", 2))
 NASTY = 'a "quoted" \\ back\\n slash ??/ trigraph */ end /* begin \x07 Größe\nline \\'
@@ -35,7 +35,7 @@ DIGEST = """
 import hashlib, sys
 sys.path.insert(0, sys.argv[1])
 from support.random_kernels import element, random_kernel
-from mstmm.derive.print.render import generated_files
+from mstmm.derive.codegen.template_rendering import generated_files
 files = generated_files([element("b", random_kernel("k", 1)), element("a", random_kernel("k", 2))])
 for name, text in files.items():
     print(name, hashlib.sha256(text.encode()).hexdigest())
@@ -77,7 +77,7 @@ def test_files_written_are_the_files_generated(tmp_path: Path) -> None:
         "hinge_drawn.json", "tape.h", "fused.h", "failures.h",
     }  # fmt: skip
     manifest = json.loads(texts["manifest.json"])
-    assert manifest["abi"] == abi.ABI
+    assert manifest["abi"] == abi.ABI_VERSION
     assert manifest["elements"] == [
         {
             "kind": "hinge",
@@ -137,7 +137,7 @@ def test_names_that_are_not_c_names_are_refused(name: str) -> None:
 def test_the_descriptor_carries_the_spec(tmp_path: Path) -> None:
     library = build(tmp_path, SPEC)
     found = library.elements["drawn"]
-    assert (found.abi, library.text(found.kind)) == (abi.ABI, "hinge")
+    assert (found.abi, library.text(found.kind)) == (abi.ABI_VERSION, "hinge")
     assert library.text(found.hash) == SPEC.hash()
     assert (found.nq, found.nu, found.np, found.n_kernels) == (1, 1, 1, 2)
     assert library.text(found.q_names[0]) == "angle"
@@ -186,7 +186,7 @@ def test_a_generated_name_is_declared_as_it_is_defined(tmp_path: Path) -> None:
     ],
 )
 def test_literals(text: str, written: str) -> None:
-    assert literal(text) == written
+    assert literal_text(text) == written
 
 
 def test_literals_mean_the_nearest_double(tmp_path: Path) -> None:
@@ -200,15 +200,15 @@ def test_literals_mean_the_nearest_double(tmp_path: Path) -> None:
 
 
 def test_string_and_comment() -> None:
-    assert string('a"b\\c?\n') == '"a\\042b\\134c\\077\\012"'
-    assert comment("a */ b\n/* c \\") == "a * / b / * c"
-    assert "*/" not in comment("**//**//")
+    assert string_literal('a"b\\c?\n') == '"a\\042b\\134c\\077\\012"'
+    assert comment_text("a */ b\n/* c \\") == "a * / b / * c"
+    assert "*/" not in comment_text("**//**//")
 
 
 def test_templates_are_strict() -> None:
-    from mstmm.derive.print import render
+    from mstmm.derive.codegen import template_rendering
 
-    environment = render._environment()
+    environment = template_rendering._environment()
     assert environment.undefined is jinja2.StrictUndefined
     assert environment.autoescape is False
     with pytest.raises(jinja2.UndefinedError):

@@ -12,10 +12,10 @@ from hypothesis import assume, given, reject
 from hypothesis import strategies as st
 from support.work import calls
 
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Assign, KernelIR, Port
+from mstmm.ir.differentiation import derivative
 from mstmm.ir.graph import Graph, Node
-from mstmm.ir.tangent import derivative
 
 DIGITS = 80
 Tree = Any

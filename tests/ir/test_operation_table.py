@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mstmm.derive.language.functions import FUNCTIONS
+from mstmm.derive.definition.sympy_functions import FUNCTIONS
 from mstmm.ir import OPERATIONS, Port
+from mstmm.ir.differentiation import derivative
 from mstmm.ir.graph import Graph
+from mstmm.ir.interpreter import evaluate_floats
 from mstmm.ir.operations import Operation
-from mstmm.ir.replay import evaluate_floats
-from mstmm.ir.tangent import derivative
 
 ROWS = pytest.mark.parametrize("row", OPERATIONS.values(), ids=lambda row: row.name)
 

@@ -14,9 +14,9 @@ import pytest
 from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Store, Temporary
-from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.interpreter import evaluate_floats
 from mstmm.ir.tape import compile_tape
 
 SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, -2.0, 3.0, 1e-310, 710.5, math.inf, -math.inf, math.nan)

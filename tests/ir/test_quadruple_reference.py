@@ -13,8 +13,8 @@ from support.rod_scenes import chain, drawn_state
 from support.scalar_kernels import ScalarKernel, farthest
 
 import mstmm
-from mstmm.runtime.pack.internal import system_of
-from mstmm.runtime.pack.structure import structure_of
+from mstmm.runtime.packing.fused_structure import structure_of
+from mstmm.runtime.packing.system_builder import system_of
 
 
 def reference(

@@ -12,9 +12,9 @@ import pytest
 from support.c_library import CLibrary, build, same
 from support.random_kernels import INPUTS, element, random_inputs, random_kernel
 
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import OPERATIONS, Assign, KernelIR, Statement, from_json, to_json
-from mstmm.ir.replay import GuardFailure, evaluate_floats
+from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.ir.tape import compile_tape
 
 SEEDS = range(30)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.audit.rounding import UNIT, rounding_bounds
+from mstmm.derive.verification.kernel_evaluation import evaluate
+from mstmm.derive.verification.rounding_bounds import UNIT_ROUNDOFF, rounding_bounds
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Port, Solve, Store, Temporary
 from mstmm.ir.graph import Graph
-from mstmm.ir.replay import GuardFailure, evaluate_floats
+from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 
 JUMPS = ("sign", "floor", "lt", "le", "eq", "and", "or", "not", "select")
 CONTINUOUS = tuple(op for op in OPERATIONS if op not in JUMPS)
@@ -51,7 +51,7 @@ def test_cancellation_is_seen() -> None:
     (got,) = evaluate_floats(kernel, {"x": 1e-10})["y"]
     assert float(value) == 1e-10
     assert abs(got - 1e-10) > 1e-18
-    assert abs(got - 1e-10) <= bound < 2.1 * UNIT
+    assert abs(got - 1e-10) <= bound < 2.1 * UNIT_ROUNDOFF
 
 
 def test_solves_are_bounded(rng: np.random.Generator) -> None:

@@ -10,12 +10,12 @@ import pytest
 from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
-from mstmm.border import elements as abi
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.abi import element_library as abi
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import LOOP_INDEX, Element, KernelIR, Port, Solve, Store, from_json, to_json
+from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.graph import Graph
-from mstmm.ir.replay import GuardFailure, evaluate_floats
-from mstmm.ir.spec import ElementSpec
+from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.ir.tape import compile_tape
 
 SIZES = (0, 1, 3, 17)

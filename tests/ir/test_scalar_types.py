@@ -9,11 +9,11 @@ import pytest
 from support.random_kernels import random_inputs, random_kernel
 from support.scalar_kernels import ScalarKernel
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.print.scalar_function import SCALARS, scalar_source
+from mstmm.derive.codegen.scalar_function import SCALARS, scalar_source
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR, Port
 from mstmm.ir.graph import Graph
-from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.interpreter import evaluate_floats
 
 #: What the type can hold, times the operations of a kernel and their conditioning.
 ACCURACY = {"float": 1e-4, "double": 1e-12, "quadruple": 1e-30}

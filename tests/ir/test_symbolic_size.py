@@ -11,19 +11,19 @@ import sympy as sp
 from support.c_library import CLibrary, build, same
 from support.random_kernels import element
 
-from mstmm.derive.audit.evaluate import evaluate
-from mstmm.derive.audit.evaluate_equations import evaluate_equations
-from mstmm.derive.audit.rounding import rounding_bounds
-from mstmm.derive.language.derivation import Derivation, Equation, Quantity, Solve
-from mstmm.derive.lower.kernel import lower
-from mstmm.derive.show.ir import listing
+from mstmm.derive.definition.derivation import Derivation, Equation, Quantity, Solve
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.show.ir_text import kernel_listing
+from mstmm.derive.verification.equation_evaluation import evaluate_equations
+from mstmm.derive.verification.kernel_evaluation import evaluate
+from mstmm.derive.verification.rounding_bounds import rounding_bounds
 from mstmm.errors import NumericalFailure
 from mstmm.ir import Element, KernelIR, Port, Store, Sum, from_json, to_json
+from mstmm.ir.differentiation import differentiate
 from mstmm.ir.graph import Graph
-from mstmm.ir.inline import unrolled
-from mstmm.ir.replay import GuardFailure, evaluate_floats
-from mstmm.ir.tangent import tangent
-from mstmm.runtime.kernels import vectorized
+from mstmm.ir.inline import unroll
+from mstmm.ir.interpreter import GuardFailure, evaluate_floats
+from mstmm.runtime.kernels import numpy_kernels
 
 n = sp.Symbol("n", integer=True, positive=True)
 SIZES = (1, 2, 3, 4)
@@ -108,7 +108,7 @@ def test_with_loops_and_with_the_size_put_in(size: int) -> None:
     forms = {
         "loops": evaluate(KERNEL, inputs, 50, size),
         "size put in": evaluate(lower(DERIVATION.at_size(size), "forms", GUARDS), inputs),
-        "unrolled": evaluate(unrolled(KERNEL, size), inputs),
+        "unrolled": evaluate(unroll(KERNEL, size), inputs),
     }
     for form, found in forms.items():
         assert list(found) == list(stated)
@@ -139,7 +139,7 @@ def test_guards_and_pivots_leave_in_every_form(library: CLibrary) -> None:
     singular = drawn(KERNEL, 2) | {"B": [1.0, 1.0, 1.0, 1.0]}
     for inputs, code in ((huge, 5), (singular, 1)):
         assert library.call("forms", "forms", inputs, 2).code == code
-        for kernel, size in ((KERNEL, 2), (unrolled(KERNEL, 2), None)):
+        for kernel, size in ((KERNEL, 2), (unroll(KERNEL, 2), None)):
             with pytest.raises(GuardFailure) as caught:
                 evaluate(kernel, inputs, n=size)
             assert caught.value.code == code
@@ -148,7 +148,7 @@ def test_guards_and_pivots_leave_in_every_form(library: CLibrary) -> None:
             for port in KERNEL.inputs
         }
         with pytest.raises(NumericalFailure, match="forms: "):
-            vectorized.evaluate(KERNEL, shaped, 2)
+            numpy_kernels.evaluate(KERNEL, shaped, 2)
 
 
 @pytest.mark.parametrize("size", (0, 1, 3))
@@ -163,7 +163,7 @@ def test_many_points_at_once(size: int) -> None:
         count = int(np.prod(lead))
         rows = [points[i][port.name] for i in range(count)]
         inputs[port.name] = np.reshape(rows, (*lead, *shapes[port.name]))
-    found = vectorized.evaluate(KERNEL, inputs, size)
+    found = numpy_kernels.evaluate(KERNEL, inputs, size)
     for i in range(2):
         for j in range(4):
             at = {
@@ -186,7 +186,7 @@ def test_many_points_know_every_operation() -> None:
         call = Assign(0, op, tuple(Element(port.name) for port in ports))
         kernel = KernelIR("one", ports, (Port("y"),), (call, Store("y", (), Temporary(0))))
         grid = np.meshgrid(*[values] * count, indexing="ij")
-        found = vectorized.evaluate(kernel, dict(zip("abc", grid, strict=False)))["y"]
+        found = numpy_kernels.evaluate(kernel, dict(zip("abc", grid, strict=False)))["y"]
         for place in np.ndindex(found.shape):
             at = {name: float(axis[place]) for name, axis in zip("abc", grid, strict=False)}
             wanted = evaluate_floats(kernel, at)["y"][0]
@@ -196,9 +196,9 @@ def test_many_points_know_every_operation() -> None:
 def test_many_points_refuse_what_does_not_fit() -> None:
     kernel = lower(DERIVATION, "forms")
     with pytest.raises(ValueError, match="no value for the input 'A'"):
-        vectorized.evaluate(kernel, {}, 2)
+        numpy_kernels.evaluate(kernel, {}, 2)
     with pytest.raises(ValueError, match=r"A ends in the shape \(2, 2\), not \(2, 3\)"):
-        vectorized.evaluate(kernel, {"A": np.zeros((2, 3))}, 2)
+        numpy_kernels.evaluate(kernel, {"A": np.zeros((2, 3))}, 2)
 
 
 def test_outputs_are_workspace_and_zeros_fold() -> None:
@@ -209,7 +209,7 @@ def test_outputs_are_workspace_and_zeros_fold() -> None:
     assert [s.body for s in later[:3]] == [(), (), ()]
     read = {s.value.port for s in later[1:3] if isinstance(s.value, Element)}
     assert read == {"Ct"}
-    text = "\n".join(listing(KERNEL))
+    text = "\n".join(kernel_listing(KERNEL))
     assert "sum over l < n" in text
     assert "for k, l < n" in text
 
@@ -244,11 +244,11 @@ def test_nested_sums_are_differentiated() -> None:
     a, d_a = rng.normal(size=(2, 3, 3))
     x, d_x = rng.normal(size=(2, 3))
     inputs = {"A": a, "x": x, "d_A": d_a, "d_x": d_x}
-    found = vectorized.evaluate(tangent(kernel, ["A", "x"]), inputs, 3)
+    found = numpy_kernels.evaluate(differentiate(kernel, ["A", "x"]), inputs, 3)
     assert np.allclose(found["d_f"], d_a @ x + a @ d_x)
     assert np.isclose(found["d_V"], x @ d_a @ x + d_x @ (a + a.T) @ x)
     with pytest.raises(ValueError, match=r"reads 'right', which the kernel has stored.*fixed size"):
-        tangent(KERNEL, ["eta"])
+        differentiate(KERNEL, ["eta"])
 
 
 # --- what is refused ------------------------------------------------------------------------------

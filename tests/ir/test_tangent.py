@@ -14,11 +14,11 @@ from ir.test_run_time_size import SIZES, drawn
 from support.complex_arithmetic import complex_step
 from support.random_kernels import random_inputs, random_kernel
 
-from mstmm.derive.audit.evaluate import evaluate
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import Constant, KernelIR, Port, Store
+from mstmm.ir.differentiation import differentiate
 from mstmm.ir.graph import Graph
-from mstmm.ir.replay import GuardFailure, evaluate_floats
-from mstmm.ir.tangent import tangent
+from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 
 Arrays = dict[str, list[float]]
 
@@ -70,7 +70,7 @@ def test_random_kernels_of_all_operations(seed: int) -> None:
     inputs = random_inputs(seed + 1000)
     ports = [["x", "A"], ["x"], ["A"]][seed % 3]
     along = directions(kernel, ports, 0, seed)
-    differentiated = tangent(kernel, ports)
+    differentiated = differentiate(kernel, ports)
     given = with_directions(inputs, along)
     precise = evaluate(differentiated, given, 60)
     for name, wanted in difference(kernel, inputs, along).items():
@@ -88,14 +88,14 @@ def test_loops_and_solves_of_a_run_time_size(n: int, rng: np.random.Generator) -
     """Sums, stores by mode and x = M^-1 b with b moving."""
     ports = ["scale", "phi", "rate", "F"]
     inputs, along = drawn(n, rng), directions(MODAL, ports, n, n)
-    found = evaluate(tangent(MODAL, ports), with_directions(inputs, along), 60, n)
+    found = evaluate(differentiate(MODAL, ports), with_directions(inputs, along), 60, n)
     for name, wanted in difference(MODAL, inputs, along, n).items():
         assert farthest(found[f"d_{name}"], wanted) < 1e-18, name
 
 
 def test_a_solve_whose_right_side_stands_still_has_no_derivative() -> None:
     found = evaluate(
-        tangent(MODAL, ["scale"]),
+        differentiate(MODAL, ["scale"]),
         {**drawn(3, np.random.default_rng(1)), "d_scale": [1.0]}, 50, 3,
     )  # fmt: skip
     assert not any(found["d_x"]) and not any(found["d_X"]) and any(found["d_s"])
@@ -103,13 +103,13 @@ def test_a_solve_whose_right_side_stands_still_has_no_derivative() -> None:
 
 def test_a_solve_whose_matrix_moves_is_refused() -> None:
     with pytest.raises(ValueError, match="the matrix 'M' of a run-time sized solve depends on"):
-        tangent(MODAL, ["M", "rate"])
+        differentiate(MODAL, ["M", "rate"])
 
 
 @pytest.mark.parametrize(("ports", "outputs"), [(["z"], None), (["x"], ["z"])])
 def test_unknown_ports_are_refused(ports: list[str], outputs: list[str] | None) -> None:
     with pytest.raises(ValueError, match="all: no port 'z' to differentiate"):
-        tangent(random_kernel("all", 1, 10), ports, outputs)
+        differentiate(random_kernel("all", 1, 10), ports, outputs)
 
 
 def small() -> KernelIR:
@@ -122,25 +122,27 @@ def small() -> KernelIR:
 
 
 def test_what_does_not_move_costs_nothing() -> None:
-    slope = tangent(small(), ["a"], values=False, guards=False)
+    slope = differentiate(small(), ["a"], values=False, guards=False)
     assert slope.operation_counts() == {"mul": 1, "sin": 1}
     stored = [s.value for s in slope.statements if isinstance(s, Store)]
     assert stored[1:] == [Constant("0"), Constant("0")]
-    assert tangent(small(), ["c"], values=False, guards=False).operation_counts() == {"mul": 1}
+    assert differentiate(small(), ["c"], values=False, guards=False).operation_counts() == {
+        "mul": 1
+    }
     # Value and derivative share what they have in common.
-    both = tangent(small(), ["a", "b"]).operation_counts()
+    both = differentiate(small(), ["a", "b"]).operation_counts()
     assert both["sin"] == both["cos"] == 1
 
 
 def test_guards_stay_unless_they_are_not_wanted() -> None:
     given = {"a": 1, "b": 2, "c": -1, "d_c": 1}
     with pytest.raises(GuardFailure, match="c is not positive"):
-        evaluate(tangent(small(), ["c"]), given)
-    assert evaluate(tangent(small(), ["c"], guards=False), given)["d_y"] == [3, 0, 0]
+        evaluate(differentiate(small(), ["c"]), given)
+    assert evaluate(differentiate(small(), ["c"], guards=False), given)["d_y"] == [3, 0, 0]
 
 
 def test_ports_stand_behind_those_of_the_kernel_and_say_what_they_are() -> None:
-    found = tangent(random_kernel("all", 2, 10), ["A"])
+    found = differentiate(random_kernel("all", 2, 10), ["A"])
     assert [(p.name, p.shape) for p in found.inputs[2:]] == [("d_A", (2, 3))]
     assert [(p.name, p.accumulate) for p in found.outputs[2:]] == [
         ("d_y", False), ("d_total", True),

@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from libraries.workbench import Kernel, scaled
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.host import lock, process  # noqa: F401 - before fork
 from mstmm.runtime.libraries import cache
+from mstmm.runtime.platform_support import file_lock, subprocesses  # noqa: F401 - before fork
 
 
 def child(factor: int) -> str:

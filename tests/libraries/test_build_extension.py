@@ -13,15 +13,15 @@ from types import SimpleNamespace
 import pytest
 
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.kernels import prebuilt
+from mstmm.runtime.kernels import prebuilt_kernels
 from mstmm.runtime.libraries.build_extension import (
     FOLDERS,
     GENERATED,
-    PASTED,
-    built_from,
+    INCLUDED_TEXT,
     cdef,
+    hand_written_sources,
     headers,
-    written_by_hand,
+    source_hash,
 )
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -155,15 +155,17 @@ def test_a_folder_without_c_says_how_to_get_it(project: Path) -> None:
 def test_a_module_from_other_text_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """After an update the module beside the new C may be the old one, with other functions."""
     again = r"_kernels.* belong to another version of mstmm; rebuild them: pip install -e \."
-    assert prebuilt.module.__wrapped__() == prebuilt.module()
+    assert prebuilt_kernels.module.__wrapped__() == prebuilt_kernels.module()
     with monkeypatch.context() as patch:
-        patch.setattr(prebuilt, "built_from", lambda folder: "0" * 64)
+        patch.setattr(prebuilt_kernels, "source_hash", lambda folder: "0" * 64)
         with pytest.raises(EnvironmentFailure, match=again):
-            prebuilt.module.__wrapped__()
-    older = SimpleNamespace(ffi=prebuilt.module()[0], lib=object(), __file__="_kernels.abi3.so")
-    monkeypatch.setattr(prebuilt, "import_module", lambda name: older)
+            prebuilt_kernels.module.__wrapped__()
+    older = SimpleNamespace(
+        ffi=prebuilt_kernels.module()[0], lib=object(), __file__="_kernels.abi3.so"
+    )
+    monkeypatch.setattr(prebuilt_kernels, "import_module", lambda name: older)
     with pytest.raises(EnvironmentFailure, match=again):
-        prebuilt.module.__wrapped__()
+        prebuilt_kernels.module.__wrapped__()
 
 
 def test_the_manifest_tells_every_generated_text(tmp_path: Path) -> None:
@@ -173,7 +175,7 @@ def test_the_manifest_tells_every_generated_text(tmp_path: Path) -> None:
         digest.update(f"{path.name}\n".encode() + path.read_bytes())
     manifest = json.loads((ROOT / "generated" / "manifest.json").read_text())
     assert manifest["sources"] == digest.hexdigest()
-    assert built_from(tmp_path) == ""
+    assert source_hash(tmp_path) == ""
 
 
 def test_a_change_of_any_text_is_noticed(project: Path) -> None:
@@ -181,18 +183,18 @@ def test_a_change_of_any_text_is_noticed(project: Path) -> None:
     manifest.write_text("{}")
     (project / "templates").mkdir()
     (project / "templates" / "fused_text.c").touch()
-    found = {built_from(project)}
-    by_hand = written_by_hand(project)
+    found = {source_hash(project)}
+    by_hand = hand_written_sources(project)
     assert {path.name for path in by_hand} == {"four_times.c", "four_times.h", "fused_text.c"}
     for number, path in enumerate((manifest, *by_hand), 1):
         path.write_text(path.read_text() + "\n")
-        found.add(built_from(project))
+        found.add(source_hash(project))
         assert len(found) == 1 + number
 
 
 def test_the_c_that_is_built_is_the_c_that_is_watched() -> None:
-    watched = {path.relative_to(ROOT) for path in written_by_hand(ROOT)}
-    for folder in (*FOLDERS, PASTED):
+    watched = {path.relative_to(ROOT) for path in hand_written_sources(ROOT)}
+    for folder in (*FOLDERS, INCLUDED_TEXT):
         if folder != GENERATED:
             there = {path.relative_to(ROOT) for path in (ROOT / folder).glob("*.[ch]")}
             assert there and there <= watched

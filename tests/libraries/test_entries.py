@@ -16,8 +16,8 @@ import pytest
 
 from libraries.workbench import Kernel, assert_tidy, entry_folders, false_compiler, scaled
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.libraries import cache, processor, toolchain
-from mstmm.runtime.libraries.upkeep import clean, listed
+from mstmm.runtime.libraries import cache, cpu_features, toolchain
+from mstmm.runtime.libraries.cache_maintenance import clean_cache, list_entries
 
 
 def test_second_time_nothing_is_printed_or_compiled(
@@ -46,8 +46,8 @@ def test_warm_hit_loads_neither_numpy_nor_what_starts_processes(cache_folder: Pa
         "import sys; before = set(sys.modules)\n"
         "from mstmm.runtime.libraries import cache\n"
         "from pathlib import Path\n"
-        "from mstmm.runtime.libraries.build import found\n"
-        f"assert found(Path({str(built.path.parent)!r}), {built.key!r}) is not None\n"
+        "from mstmm.runtime.libraries.library_build import find_library\n"
+        f"assert find_library(Path({str(built.path.parent)!r}), {built.key!r}) is not None\n"
         "print(*(set(sys.modules) - before))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
@@ -60,7 +60,7 @@ def test_entry_says_what_it_was_made_of(cache_folder: Path) -> None:
     about = json.loads((built.path.parent / "entry.json").read_text())
     assert about["identity"] == {"factor": "3", "more": ""} and about["key"] == built.key
     assert about["flags"] == ["-O1", "-march=native"]
-    assert about["compiler"]["path"] == toolchain.compiler().path
+    assert about["compiler"]["path"] == toolchain.find_compiler().path
     assert about["compiler_version"] != "unknown"
     text = gzip.decompress((built.path.parent / "kernel.c.gz").read_bytes()).decode()
     assert "return 3 * x;" in text and built.key in text
@@ -88,13 +88,13 @@ def _other_compiler(recipe: cache.Recipe, patch: pytest.MonkeyPatch, folder: Pat
 def _updated_compiler(
     recipe: cache.Recipe, patch: pytest.MonkeyPatch, folder: Path
 ) -> cache.Recipe:
-    found = toolchain.compiler()
-    patch.setattr(toolchain, "compiler", lambda: replace(found, modified=found.modified + 1))
+    found = toolchain.find_compiler()
+    patch.setattr(toolchain, "find_compiler", lambda: replace(found, modified=found.modified + 1))
     return recipe
 
 
 def _other_processor(recipe: cache.Recipe, patch: pytest.MonkeyPatch, folder: Path) -> cache.Recipe:
-    patch.setattr(processor, "features", lambda: {"model name": "other", "flags": "sse2"})
+    patch.setattr(cpu_features, "features", lambda: {"model name": "other", "flags": "sse2"})
     return recipe
 
 
@@ -125,9 +125,9 @@ def test_what_decides_the_code_decides_the_key(
     change: str, cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe = Kernel().recipe
-    _, before = cache._placed(recipe)
-    _, same = cache._placed(Kernel().recipe)
-    _, after = cache._placed(CHANGES[change](recipe, monkeypatch, tmp_path))
+    _, before = cache._place_and_order(recipe)
+    _, same = cache._place_and_order(Kernel().recipe)
+    _, after = cache._place_and_order(CHANGES[change](recipe, monkeypatch, tmp_path))
     assert same.key == before.key != after.key
 
 
@@ -137,16 +137,16 @@ def test_processor_is_read_from_its_first_block(tmp_path: Path) -> None:
         "processor\t: 0\nmodel name\t: Some CPU\ncpu MHz\t: 1.0\nflags\t: fpu avx2\n\n"
         "processor\t: 1\nflags\t: fpu\n"
     )
-    found = processor.features(x86)
+    found = cpu_features.features(x86)
     assert found["flags"] == "fpu avx2" and found["model name"] == "Some CPU"
     assert "cpu MHz" not in found and "host" not in found
     arm = tmp_path / "arm"
     arm.write_text("processor\t: 0\nFeatures\t: fp asimd\nCPU part\t: 0xd0c\n")
-    assert processor.features(arm)["Features"] == "fp asimd"
+    assert cpu_features.features(arm)["Features"] == "fp asimd"
 
 
 def test_unknown_processor_shares_with_no_other_machine(tmp_path: Path) -> None:
-    assert processor.features(tmp_path / "missing")["host"] == os.uname().nodename
+    assert cpu_features.features(tmp_path / "missing")["host"] == os.uname().nodename
 
 
 # --- what was changed behind our back -------------------------------------------------------------
@@ -235,7 +235,7 @@ def test_library_of_another_layout_is_built_again_once(cache_folder: Path) -> No
             raise EnvironmentFailure("built for ABI 0")
         return scaled(path, key)
 
-    value, built = cache.opened(kernel.recipe, opener)
+    value, built = cache.open_cached_library(kernel.recipe, opener)
     assert value == 21.0 and built.how == "compiled" and len(kernel.printed) == 2
     assert_tidy(cache_folder, 1)
 
@@ -247,7 +247,7 @@ def test_library_that_is_refused_for_ever_is_told(cache_folder: Path) -> None:
     kernel = Kernel()
     cache.library(kernel.recipe)
     with pytest.raises(EnvironmentFailure, match="wrong ELF class"):
-        cache.opened(kernel.recipe, opener)
+        cache.open_cached_library(kernel.recipe, opener)
     assert len(kernel.printed) == 2
 
 
@@ -262,10 +262,10 @@ def test_least_recently_used_goes_first(
         then = one.path.stat().st_mtime - 1000 * (age + 1)
         os.utime(one.path.parent / "entry.json", (then, then))
     assert cache.library(Kernel(factor=3).recipe).how == "cached"  # used now: no longer the oldest
-    size = sum(entry.bytes for entry in listed(cache_folder))
+    size = sum(entry.bytes for entry in list_entries(cache_folder))
     monkeypatch.setenv("MSTMM_CACHE_SIZE", str(1.1 * size / 1e6))  # room for four
     cache.library(Kernel(factor=9).recipe)
-    kept = {entry.about["key"] for entry in listed(cache_folder)}
+    kept = {entry.about["key"] for entry in list_entries(cache_folder)}
     assert built[2].key not in kept and {built[0].key, built[1].key, built[3].key} < kept
 
 
@@ -281,8 +281,8 @@ def test_what_is_in_use_stays_beyond_the_limit(
 def test_clean_spares_what_was_used_lately(cache_folder: Path) -> None:
     old, new = (cache.library(Kernel(factor=i).recipe) for i in (1, 2))
     os.utime(old.path.parent / "entry.json", (1e9, 1e9))
-    assert clean(cache_folder, unused=3600.0)[0] == 1
+    assert clean_cache(cache_folder, unused=3600.0)[0] == 1
     assert not old.path.exists() and scaled(new.path, new.key) == 14.0
-    count, size = clean(cache_folder)
+    count, size = clean_cache(cache_folder)
     assert count == 1 and size > 1000
     assert list(cache_folder.iterdir()) == []

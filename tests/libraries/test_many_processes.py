@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 from libraries.workbench import Kernel, alive, assert_tidy, entry_folders, false_compiler, scaled
-from mstmm.runtime.host import lock
 from mstmm.runtime.libraries import cache
-from mstmm.runtime.libraries import entry as entries
-from mstmm.runtime.libraries.build import remove_leftovers
-from mstmm.runtime.libraries.upkeep import clean, unfinished
+from mstmm.runtime.libraries import cache_entry as entries
+from mstmm.runtime.libraries.cache_maintenance import clean_cache, count_unfinished_builds
+from mstmm.runtime.libraries.library_build import remove_leftovers
+from mstmm.runtime.platform_support import file_lock
 
 BUILDER = Path(__file__).parent / "builder.py"
 
@@ -141,14 +141,14 @@ def test_lock_and_compiler_end_with_their_killed_owner(
     assert crowd.said() == []
     _until(lambda: not any(alive(pid) for pid in started))
     remains = int(which != "SIGINT")  # Python leaves its blocks there, and cleans up
-    assert unfinished(cache_folder) == remains and entry_folders(cache_folder) == []
+    assert count_unfinished_builds(cache_folder) == remains and entry_folders(cache_folder) == []
     monkeypatch.delenv("CC")
-    path = cache._placed(Kernel().recipe)[0]
-    with lock.locked(path.parent / f".{path.name}.lock", timeout=0.0) as remark:
+    path = cache._place_and_order(Kernel().recipe)[0]
+    with file_lock.file_lock(path.parent / f".{path.name}.lock", timeout=0.0) as remark:
         assert remark == ""  # nobody waits for the dead
     built = cache.library(Kernel().recipe)
     assert scaled(built.path, built.key) == 21.0
-    assert unfinished(cache_folder) == remains  # young: it could be somebody's
+    assert count_unfinished_builds(cache_folder) == remains  # young: it could be somebody's
     for left in cache_folder.glob(".building-*"):
         os.utime(left, (1e9, 1e9))
     cache.library(Kernel(factor=8).recipe)
@@ -165,10 +165,10 @@ def test_owner_that_takes_too_long_is_named_and_not_waited_for(
     cache_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Patience for the owner alone: the compiler has as long as it takes."""
-    locked = lock.locked
-    monkeypatch.setattr(lock, "locked", lambda place, timeout: locked(place, 1.0))
+    locked = file_lock.file_lock
+    monkeypatch.setattr(file_lock, "file_lock", lambda place, timeout: locked(place, 1.0))
     kernel = Kernel()
-    place = cache._placed(kernel.recipe)[0]
+    place = cache._place_and_order(kernel.recipe)[0]
     with locked(place.parent / f".{place.name}.lock", timeout=0.0) as remark:
         assert remark == ""
         built = cache.library(kernel.recipe)
@@ -193,14 +193,14 @@ def test_slower_of_two_builders_takes_what_is_there(
     """Without a lock both compile; the second finds the place taken."""
     kernel = Kernel()
     plain = kernel.recipe
-    inner: list[cache.Built] = []
+    inner: list[cache.BuiltLibrary] = []
 
     def sources(key: str) -> dict[str, str]:
         if not inner:
             inner.append(cache.library(kernel.recipe, timeout=60.0))
         return dict(plain.sources(key))
 
-    monkeypatch.setattr(lock, "_try", lambda handle: None)
+    monkeypatch.setattr(file_lock, "_try_lock", lambda handle: None)
     recipe = cache.Recipe(plain.name, plain.identity, sources, plain.flags)
     built = cache.library(recipe)
     assert built.path == inner[0].path and scaled(built.path, built.key) == 21.0
@@ -230,11 +230,11 @@ def test_removed_while_others_use_it(cache_folder: Path) -> None:
 
     def opener(path: Path, key: str) -> float:
         if not removed:
-            removed.append(clean(cache_folder)[0])
+            removed.append(clean_cache(cache_folder)[0])
         return scaled(path, key)
 
     removed: list[int] = []
-    value, again = cache.opened(Kernel().recipe, opener)
+    value, again = cache.open_cached_library(Kernel().recipe, opener)
     assert value == 21.0 and removed == [1] and again.path == built.path
     assert_tidy(cache_folder, 1)
 
@@ -243,7 +243,7 @@ def test_removed_while_others_use_it(cache_folder: Path) -> None:
 KILLED_AT_ONCE = """\
 import os, signal, subprocess, sys
 from pathlib import Path
-from mstmm.runtime.host import process
+from mstmm.runtime.platform_support import subprocesses
 
 start, note = subprocess.Popen, Path(sys.argv[1])
 
@@ -255,7 +255,7 @@ def started(command, **kept):
     return made
 
 subprocess.Popen = started
-process.run([sys.argv[2], "version"], note.parent, 600.0)
+subprocesses.run([sys.argv[2], "version"], note.parent, 600.0)
 """
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from libraries.workbench import Kernel, scaled
 from mstmm.errors import ElementError, EnvironmentFailure
-from mstmm.runtime.kernels import store
+from mstmm.runtime.kernels import kernel_store
 from mstmm.runtime.libraries import cache
 
 DEEP = "[" * 100_000
@@ -104,7 +104,7 @@ def test_descriptions_that_nest_without_end_are_damaged(
     (tmp_path / "store").chmod(0o700)
     (place / "element.json").write_text(DEEP)
     with pytest.raises(ElementError, match="damaged"):
-        store.spec(("hinge", "knee"))
+        kernel_store.find_spec(("hinge", "knee"))
     (place / "element.json").chmod(0o666)
     with pytest.raises(EnvironmentFailure, match=r"others may write to element\.json"):
-        store.spec(("hinge", "knee"))
+        kernel_store.find_spec(("hinge", "knee"))

@@ -14,10 +14,10 @@ import pytest
 
 import mstmm
 from libraries.workbench import NOBODY, entry_folders, false_compiler
-from mstmm.bridge.fusion import Fusion
-from mstmm.runtime.kernels.fused import open_library
+from mstmm.pipeline.fused_code import Fusion
+from mstmm.runtime.kernels.fused_library import open_library
 from mstmm.runtime.libraries import cache
-from mstmm.runtime.libraries.upkeep import listed
+from mstmm.runtime.libraries.cache_maintenance import list_entries
 
 MASS, ARM, INERTIA, G = 1.7, 0.4, 0.3, 9.81
 #: Evaluations that repay any compiler.
@@ -50,7 +50,7 @@ def test_fused_code_comes_from_the_compiler_then_from_the_cache(
     assert again.engine == "fused" and "cache" in again.engine_choice
     assert_right(first)
     assert_right(again)
-    whole = [entry for entry in listed(cache_folder) if not entry.problem]
+    whole = [entry for entry in list_entries(cache_folder) if not entry.problem]
     assert len(whole) == len(entry_folders(cache_folder)) >= 1
 
 
@@ -143,7 +143,7 @@ def test_damaged_library_is_not_opened_but_built_again(
     model = mstmm.compile(scene, engine="fused")
     assert "rebuilt" in model.engine_choice
     assert_right(model)
-    assert {entry.problem for entry in listed(cache_folder)} == {""}
+    assert {entry.problem for entry in list_entries(cache_folder)} == {""}
 
 
 def test_library_of_another_layout_is_built_again(
@@ -159,7 +159,7 @@ def test_library_of_another_layout_is_built_again(
             raise mstmm.EnvironmentFailure("built for layout 0")
         return open_library(path, key)
 
-    monkeypatch.setattr("mstmm.bridge.fusion.open_library", reluctant)
+    monkeypatch.setattr("mstmm.pipeline.fused_code.open_library", reluctant)
     model = mstmm.compile(scene, engine="fused")
     assert len(attempts) == 2 and model.engine == "fused"
     assert_right(model)
@@ -183,7 +183,7 @@ def test_parameter_study_compiles_once(
 
 def test_the_key_is_that_of_the_library(cache_folder: Path, scene: mstmm.Scene) -> None:
     model = mstmm.compile(scene, engine="fused")
-    (entry,) = listed(cache_folder)
+    (entry,) = list_entries(cache_folder)
     assert isinstance(model.fusion, Fusion)
     found = cache.find(model.fusion._recipe("scalar"))
     assert found is not None and found.key == entry.about["key"]

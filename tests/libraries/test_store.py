@@ -15,8 +15,8 @@ import pytest
 import mstmm
 from libraries.workbench import false_compiler
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.kernels import store
-from mstmm.runtime.libraries.folder import objection
+from mstmm.runtime.kernels import kernel_store
+from mstmm.runtime.libraries.cache_folder import folder_problem
 
 DEFINITIONS = Path(__file__).parents[1] / "user_elements" / "definitions"
 KNEE = {"type": "knee", "parameters": {"width": 0.06, "depth": 0.03, "slip": 0.4}}
@@ -40,7 +40,7 @@ def library(generated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     shutil.copytree(generated, tmp_path / "store")
     monkeypatch.setenv("MSTMM_KERNELS", str(tmp_path / "store"))
     monkeypatch.delenv("CC", raising=False)
-    store.opened.cache_clear()
+    kernel_store.open_element.cache_clear()
     (found,) = (tmp_path / "store").glob("hinge_knee/*/hinge_knee.so")
     return found
 
@@ -71,7 +71,7 @@ def test_damaged_library_is_built_again_from_its_text(library: Path) -> None:
     flipped[len(content) // 2] ^= 1
     for damaged in (content[:1000], b"", bytes(flipped)):
         replaced(library, damaged)
-        store.opened.cache_clear()
+        kernel_store.open_element.cache_clear()
         how, found = accelerations()
         assert how == "library" and np.array_equal(found, expected)
         assert library.read_bytes() != damaged
@@ -83,7 +83,7 @@ def test_damaged_library_without_a_compiler_is_interpreted(
     _, expected = accelerations()
     replaced(library, library.read_bytes()[:1000])
     monkeypatch.setenv("CC", "/nonexistent")
-    store.opened.cache_clear()
+    kernel_store.open_element.cache_clear()
     how, found = accelerations()
     assert how == "tape" and np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
 
@@ -125,7 +125,7 @@ def test_nothing_is_taken_from_a_folder_that_others_may_write_to(
     place = library.parents[1] if below else library.parents[2]
     place.chmod(mode)
     generate = partial(mstmm.generate_file, DEFINITIONS / "knee.py")
-    for attempt in (accelerations, store.specs, generate):
+    for attempt in (accelerations, kernel_store.all_specs, generate):
         with pytest.raises(EnvironmentFailure, match=r"others may write.*chmod 700.*MSTMM_KERNELS"):
             attempt()
     place.chmod(0o755)
@@ -141,7 +141,7 @@ def test_nothing_is_taken_from_a_folder_of_somebody_else(
         with pytest.raises(EnvironmentFailure, match=r"belongs to user .*MSTMM_KERNELS"):
             accelerations()
     place, status = library.parents[2], os.stat(library.parents[2])
-    assert "belongs to user" in objection(place, status, owners=())
+    assert "belongs to user" in folder_problem(place, status, owners=())
 
 
 def test_a_new_store_is_private(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

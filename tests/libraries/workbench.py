@@ -13,9 +13,9 @@ from typing import Any
 
 import cffi
 
-from mstmm.runtime.libraries import entry as entries
-from mstmm.runtime.libraries.build import LOCK, UNFINISHED
+from mstmm.runtime.libraries import cache_entry as entries
 from mstmm.runtime.libraries.cache import Recipe
+from mstmm.runtime.libraries.library_build import LOCK_SUFFIX, UNFINISHED_PREFIX
 
 #: A user who owns nothing here.
 NOBODY = 65534
@@ -74,8 +74,8 @@ def assert_tidy(cache: Path, count: int) -> None:
         names = {path.name for path in folder.iterdir()}
         assert names == {"entry.json", "kernel.c.gz", "kernel.so"}
     hidden = [path.name for path in cache.iterdir() if path.name.startswith(".")]
-    assert not [name for name in hidden if name.startswith(UNFINISHED)]
-    assert all(name.endswith(LOCK) for name in hidden)
+    assert not [name for name in hidden if name.startswith(UNFINISHED_PREFIX)]
+    assert all(name.endswith(LOCK_SUFFIX) for name in hidden)
 
 
 def false_compiler(folder: Path, script: str, name: str = "cc") -> Path:

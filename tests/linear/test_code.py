@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from reference.compare import drawn, worst
 
 import mstmm
-from mstmm.runtime.engine import slopes
+from mstmm.runtime.engine import compiled_linearisation
 
 MATRICES = ("M", "C", "K", "V", "W", "A", "elastic", "damping")
 ARRAYS = ("udot", "q", "u", "efforts", "t", "rate_q", "rate_u")
@@ -109,7 +109,7 @@ def test_code_is_compiled_once_so_many_states_pay(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MSTMM_CACHE", str(tmp_path))
-    monkeypatch.setattr(slopes, "_SECONDS_PER_PAIR", 1e-4)
+    monkeypatch.setattr(compiled_linearisation, "_SECONDS_PER_PAIR", 1e-4)
     model = mstmm.compile(pendulum())
     by_sweep = 0
     while model.linearize([0.2]).about is None:

@@ -11,7 +11,7 @@ from linear.test_response import Scene, chain, compiled, masses
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.linear.linear import Linear
+from mstmm.runtime.linear.linear_model import Linear
 
 OMEGA = np.array([0.4, 3.0, 11.0])
 

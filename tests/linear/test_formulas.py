@@ -11,16 +11,16 @@ import pytest
 import sympy
 
 import mstmm
-from mstmm.bridge.expressions import Writer
 from mstmm.errors import SceneError
 from mstmm.ir import KernelIR, Port
-from mstmm.ir.formulas import FormulaArithmetic
 from mstmm.ir.graph import Graph
+from mstmm.ir.interpreter import evaluate_floats, replay_kernel
 from mstmm.ir.operations import OPERATIONS
-from mstmm.ir.replay import evaluate_floats, run
-from mstmm.numbers.dual import atan2, hypot
-from mstmm.numbers.formula import Book, Formula, exact, root
-from mstmm.numbers.rotations import from_quaternion, from_rpy, unit
+from mstmm.ir.symbolic_arithmetic import FormulaArithmetic
+from mstmm.numerics.dual import atan2, hypot
+from mstmm.numerics.rotations import from_quaternion, from_rpy, unit_vector
+from mstmm.numerics.symbolic_number import Formula, SymbolTable, square_root, to_exact
+from mstmm.pipeline.sympy_expressions import SympyWriter
 
 AT, ELSEWHERE = (0.3, 0.55, 0.8), (0.35, 0.5, 0.9)
 
@@ -37,13 +37,13 @@ def kernel_of(op: str) -> KernelIR:
 
 
 def symbols(most: int = 100_000) -> list[Formula]:
-    book = Book(most)
+    book = SymbolTable(most)
     return [book.symbol(name, value) for name, value in zip("xyz", AT, strict=True)]
 
 
 def at(found: Formula, given: list[Formula], values: tuple[float, ...]) -> float:
     """The formula at other values of its symbols."""
-    writer = Writer()
+    writer = SympyWriter()
     names = [writer.symbol(one) for one in given]
     expression: Any = writer.matrix([[found]])[0, 0]
     return float(expression.subs(dict(zip(names, values, strict=True))))
@@ -52,7 +52,7 @@ def at(found: Formula, given: list[Formula], values: tuple[float, ...]) -> float
 @pytest.mark.parametrize("op", OPERATIONS)
 def test_every_operation(op: str) -> None:
     kernel, given = kernel_of(op), symbols()
-    (found,) = run(kernel, {"p": given}, FormulaArithmetic(), None)["r"]
+    (found,) = replay_kernel(kernel, {"p": given}, FormulaArithmetic(), None)["r"]
     assert found.value == evaluate_floats(kernel, {"p": list(AT)})["r"][0]
     for values in (AT, ELSEWHERE):
         (wanted,) = evaluate_floats(kernel, {"p": list(values)})["r"]
@@ -64,7 +64,7 @@ def test_every_operation(op: str) -> None:
     [
         lambda v: from_rpy(v)[1],
         lambda v: from_quaternion([*v, 0.2])[2],
-        unit,
+        unit_vector,
         lambda v: (hypot(v), atan2(v[0], v[1]), 1 / (v[0] + 2 * v[1]) - abs(-v[2])),
     ],
 )
@@ -80,8 +80,8 @@ def test_what_packing_asks_of_numbers(function: Any) -> None:
 def test_what_cancels_is_gone() -> None:
     x, y, z = symbols()
     assert ((x + y) * (x - y) - x * x + y * y).terms == {}
-    assert (root(x * y + z) * root(x * y + z) - z - y * x).terms == {}
-    assert root(x * x * y * y * 4).terms == (2 * x * y).terms
+    assert (square_root(x * y + z) * square_root(x * y + z) - z - y * x).terms == {}
+    assert square_root(x * x * y * y * 4).terms == (2 * x * y).terms
     assert ((x + y) / (2 * z) * z).terms == (x / 2 + y / 2).terms
     turned: Any = from_rpy([x, 0.0, 0.0])  # type: ignore[list-item]
     assert turned[0][0] == 1.0
@@ -89,7 +89,7 @@ def test_what_cancels_is_gone() -> None:
 
 
 def test_a_zero_in_symbols_is_no_zero() -> None:
-    book = Book(10)
+    book = SymbolTable(10)
     zero = book.symbol("zero", 0.0)
     assert zero and zero != 0 and zero <= 0 and zero >= 0 and not zero < 0 and not zero > 0
     assert zero - zero == 0 and not (zero - zero)
@@ -106,8 +106,8 @@ def test_a_branch_that_is_not_taken_may_divide_by_zero() -> None:
     near = graph.call("lt", x * x, 1e-8)
     found = graph.call("select", near, y * 2, graph.call("sqrt", -y) / x)
     kernel = graph.kernel("one", [Port("p", (2,))], [Port("r", (1,))], {"r": [found]})
-    y_symbol = Book(10).symbol("y", 3.0)
-    (taken,) = run(kernel, {"p": [0.0, y_symbol]}, FormulaArithmetic(), None)["r"]
+    y_symbol = SymbolTable(10).symbol("y", 3.0)
+    (taken,) = replay_kernel(kernel, {"p": [0.0, y_symbol]}, FormulaArithmetic(), None)["r"]
     assert taken == y_symbol * 2
 
 
@@ -131,8 +131,8 @@ def test_springs_of_a_ball_at_rest(hinge: str) -> None:
      (math.inf, math.inf)],
 )  # fmt: skip
 def test_doubles_that_stand_for_fractions(double: float, taken: Fraction | float) -> None:
-    assert exact(double) == taken
-    assert type(exact(double)) is type(taken)
+    assert to_exact(double) == taken
+    assert type(to_exact(double)) is type(taken)
 
 
 def test_long_formulas_end_at_the_limit() -> None:

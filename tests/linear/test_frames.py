@@ -8,7 +8,7 @@ from linear.scenes import UNIT
 from scipy.optimize import brentq
 
 import mstmm
-from mstmm.runtime.linear.counting import Counting
+from mstmm.runtime.linear.mode_count import Counting
 
 
 def spans(count: int) -> mstmm.Scene:

@@ -11,7 +11,7 @@ from linear.scenes import column, hanging_beam, pendulum, rotor_blade, top
 from scipy.linalg import eigvalsh
 
 import mstmm
-from mstmm.runtime.linear.linear import Linear
+from mstmm.runtime.linear.linear_model import Linear
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 PARTS = ("elastic", "geometric", "load")

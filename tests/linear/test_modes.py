@@ -13,8 +13,8 @@ from scipy.special import jn_zeros
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.linear import krylov
-from mstmm.runtime.linear.counting import Counting
+from mstmm.runtime.linear import lanczos_iteration
+from mstmm.runtime.linear.mode_count import Counting
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -58,14 +58,14 @@ def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no room for more, the search goes on from what it has."""
     linear = of(hanging(450)).linearize(disturbances=())
     expected = linear.modes(10)
-    monkeypatch.setattr(krylov, "_VECTORS", 1)
-    monkeypatch.setattr(krylov, "_ROOM", 14)
+    monkeypatch.setattr(lanczos_iteration, "_VECTORS", 1)
+    monkeypatch.setattr(lanczos_iteration, "_ROOM", 14)
     modes = linear.modes(10)
     assert modes.complete
     np.testing.assert_allclose(modes.omega, expected.omega, rtol=1e-9)
     units = np.einsum("ik,ij,jl->kl", modes.shapes, linear.M, modes.shapes)
     np.testing.assert_allclose(units, np.eye(10), atol=1e-9)
-    monkeypatch.setattr(krylov, "_RUNS", 1)
+    monkeypatch.setattr(lanczos_iteration, "_RUNS", 1)
     with pytest.raises(NumericalFailure, match="of 12 motions found"):
         linear.modes(10)
 

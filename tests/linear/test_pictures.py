@@ -11,7 +11,7 @@ from linear.scenes import hanging_beam, pendulum
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.linear.response import FrequencyResponse
+from mstmm.runtime.linear.frequency_response import FrequencyResponse
 
 OMEGA = np.geomspace(0.5, 60, 60)
 

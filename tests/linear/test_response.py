@@ -14,9 +14,9 @@ from support.work import calls
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.engine.response import Response
-from mstmm.runtime.engine.tangent import Tangent
-from mstmm.runtime.linear.linear import Linear
+from mstmm.runtime.engine.harmonic_response import HarmonicResponse
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
+from mstmm.runtime.linear.linear_model import Linear
 
 Scene = dict[str, Any]
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -98,7 +98,7 @@ def test_a_frequency_costs_a_fixed_share_a_body() -> None:
             )
 
         engine = linear.model.looped
-        numbers = len(Tangent(engine).numbers) + engine.packed.workspace
+        numbers = len(TangentMatrix(engine).numbers) + engine.packed.workspace
         kept.append(numbers / count)
         called.append(asked(9) - asked(1))
     assert kept[1] <= kept[0] and called[0] == called[1] == 0
@@ -110,7 +110,7 @@ def test_two_and_four_frequencies_at_a_time() -> None:
     engine = mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
     still, columns = np.zeros(engine.nu), np.eye(engine.nu)
     few, many = (
-        Response(engine, 0.3, q, still, still, lanes).amplitudes(1j * OMEGA, columns)[0]
+        HarmonicResponse(engine, 0.3, q, still, still, lanes).amplitudes(1j * OMEGA, columns)[0]
         for lanes in (2, 4)
     )
     assert np.abs(few - many).max() < 1e-12 * np.abs(few).max()

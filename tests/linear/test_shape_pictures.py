@@ -10,8 +10,8 @@ from linear.scenes import UNIT, column, hanging, masses, pendulum
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.linear.motions import Modes
-from mstmm.runtime.linear.pictures.outlines import shown
+from mstmm.runtime.linear.modes import Modes
+from mstmm.runtime.linear.plots.wireframe import deformed_outlines
 
 pytest.importorskip("matplotlib")
 
@@ -23,7 +23,7 @@ def modes_of(scene: mstmm.Scene) -> Modes:
 def test_points_move_as_the_shape_says() -> None:
     """Small angles of rods that hang move their ends sideways, by the sum of all above."""
     modes = modes_of(hanging(4))
-    rest, moved = shown(modes.linear, modes.shapes, 0.1)
+    rest, moved = deformed_outlines(modes.linear, modes.shapes, 0.1)
     assert [len(line) for line in rest.bodies] == [2] * 7  # four rods and three joints between
     for k, outline in enumerate(moved):
         tips = np.array([line[1] for line in outline.bodies[:4]])

@@ -15,8 +15,8 @@ from sympy.physics import mechanics
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
-from mstmm.runtime.linear.linear import Linear
-from mstmm.runtime.linear.symbolic import Symbolic
+from mstmm.runtime.linear.linear_model import Linear
+from mstmm.runtime.linear.symbolic_matrices import SymbolicLinearModel
 from mstmm.runtime.model.model import Model
 
 ROD = {"mass": 2.5, "center_of_mass": [0.3, 0, 0], "inertia": [0.1, 0.2, 0.2],
@@ -36,7 +36,7 @@ def pendulum(links: int, **law: Any) -> mstmm.Model:
     return mstmm.compile(mstmm.Scene(gravity=[0, -9.81, 0], body=bodies, hinge=hinges))
 
 
-def check_numbers(linear: Linear, found: Symbolic, values: dict[str, float]) -> None:
+def check_numbers(linear: Linear, found: SymbolicLinearModel, values: dict[str, float]) -> None:
     """Every matrix against the looped engine at these values of numbers of the scene."""
     other = replace(linear, model=linear.model.with_parameters(values))
     for name in MATRICES:

@@ -16,9 +16,9 @@ from reference.compare import worst
 from reference.random_loops import random_mechanism
 
 import mstmm
-from mstmm.bridge.precise import precise, relative_error
-from mstmm.runtime.engine.engine import Engine
-from mstmm.runtime.engine.loops.calls import LoopCalls
+from mstmm.pipeline.extended_precision import extended_precision_accelerations, relative_error
+from mstmm.runtime.engine.looped_engine import LoopedEngine
+from mstmm.runtime.engine.loops.loop_calls import LoopCalls
 
 #: Over the smallest pivot; and what all of these keep, down to pivots of 7e-6.
 ROUNDING, MOST = 1e-14, 5e-12
@@ -28,7 +28,7 @@ def smallest_pivot(model: mstmm.Model, q: Any) -> float:
     """In parts of the mobility of its row; 1 where nothing closes."""
     if not model.loops.cut:
         return 1.0
-    calls = LoopCalls(Engine(model.packed), q)
+    calls = LoopCalls(LoopedEngine(model.packed), q)
     calls.correction(calls.slip, q, np.zeros(model.nu))
     return float((calls.pivots() / calls.mobility).min())
 
@@ -56,7 +56,7 @@ def test_what_is_lost_is_rounding_of_the_sweep() -> None:
     mechanism that loses most keeps 11, by a pivot of 1.2e-5."""
     scene, q, u = random_mechanism(2)
     model = mstmm.compile(mstmm.Scene(**copy.deepcopy(scene)), engine="looped")
-    exact = precise(model)(q, u)
+    exact = extended_precision_accelerations(model)(q, u)
     assert relative_error(dense.solve(scene, q, u).udot, exact) < 3e-14
     pivot = smallest_pivot(model, q)
     assert 1e-6 < pivot < 1e-4

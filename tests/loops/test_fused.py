@@ -11,11 +11,11 @@ from reference.compare import worst
 from reference.random_loops import random_mechanism
 
 import mstmm
-from mstmm.bridge.fusion import Fusion
-from mstmm.ir.replay import evaluate_floats
-from mstmm.runtime.pack.pack import pack
-from mstmm.runtime.pack.structure import structure_of
-from mstmm.runtime.run.system import SceneCode, SceneSystem
+from mstmm.ir.interpreter import evaluate_floats
+from mstmm.pipeline.fused_code import Fusion
+from mstmm.runtime.packing.fused_structure import structure_of
+from mstmm.runtime.packing.scene_packing import pack
+from mstmm.runtime.run.scene_system import SceneCode, SceneSystem
 
 from .constraints.scenes import cycloid, governor, on_a_plane, on_a_road
 from .linkages import bricard, cranks, four_bar

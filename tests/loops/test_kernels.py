@@ -8,8 +8,8 @@ from typing import Any
 import mpmath
 import pytest
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.catalogue.kernels import generic_kernels, loop_kernels
+from mstmm.derive.verification.kernel_evaluation import evaluate
 
 DIGITS = 40
 KERNELS = {kernel.name: kernel.ir() for kernel in loop_kernels()}

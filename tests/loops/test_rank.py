@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.engine.loops.closed import Loops
+from mstmm.runtime.engine.loops.loop_analysis import LoopAnalysis
 
 from .linkages import bricard, cranks
 from .scenes import Scene, four_bars, rod, scissors
@@ -36,7 +36,7 @@ def _rotation(roll: float, pitch: float, yaw: float) -> np.ndarray:
     return z @ y @ x
 
 
-def loops_of(scene: Scene) -> Loops:
+def loops_of(scene: Scene) -> LoopAnalysis:
     return mstmm.compile(mstmm.Scene(**scene)).loops
 
 
@@ -236,4 +236,4 @@ def test_rows_are_called_by_axes_of_their_own() -> None:
 def test_a_tree_closes_nothing() -> None:
     scene = linkage(None, laws=False)
     del scene["hinge"][3]
-    assert loops_of(scene) == Loops()
+    assert loops_of(scene) == LoopAnalysis()

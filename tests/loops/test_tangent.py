@@ -10,7 +10,7 @@ import pytest
 from reference.random_couplings import random_coupled
 
 import mstmm
-from mstmm.runtime.engine.tangent import Tangent
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 
 from . import test_four_bar as pins
 from .constraints.scenes import cycloid, governor, on_a_road
@@ -87,7 +87,7 @@ def test_a_step(case: tuple[mstmm.Model, float, float], apart: bool) -> None:
     """Increments of a step obey the derivatives of the accelerations themselves."""
     model, s, off = case
     q, u = beside(model, off if apart else 0.0)
-    tangent = Tangent(model.looped)
+    tangent = TangentMatrix(model.looped)
     assert np.abs(tangent.residual(0.3, q, u)).max() < 1e-10
     tangent.factor(s, s)
     free = ~np.array([hinge_is_driven(model, j) for j in range(model.nu)])
@@ -112,7 +112,7 @@ def test_time(case: tuple[mstmm.Model, float, float]) -> None:
     """What the accelerations change by with the time alone: efforts and drives."""
     model, _, off = case
     q, u = beside(model, off)
-    tangent = Tangent(model.looped)
+    tangent = TangentMatrix(model.looped)
     tangent.residual(0.3, q, u)
     found = tangent.accelerations_rate()
     wanted = differences(lambda e: model.accelerations(q, u, 0.3 + e), 1e-3)

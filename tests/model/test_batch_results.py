@@ -12,7 +12,7 @@ from support.result_scenes import rod
 
 import mstmm
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.result.batch import Batch
+from mstmm.runtime.result.batch_result import BatchResult
 
 RUN: dict[str, Any] = {"t_end": 1.0, "output_times": np.linspace(0, 1, 6), "rtol": 1e-10}
 PUSHES = np.array([-1.0, 0.5, 2.0])
@@ -38,13 +38,13 @@ def model() -> Model:
 
 
 @pytest.fixture(scope="module")
-def batch(model: Model) -> Batch:
+def batch(model: Model) -> BatchResult:
     return model.simulate_batch(
         model.initial_state(), {"rod2.mass": MASSES}, inputs={"push": PUSHES}, **RUN
     )
 
 
-def test_each_run_has_the_quantities_of_a_single_one(model: Model, batch: Batch) -> None:
+def test_each_run_has_the_quantities_of_a_single_one(model: Model, batch: BatchResult) -> None:
     names = ("rod2.tip.position", "shoulder.force", "energy", "motor", "push", "wind.power",
              "shoulder.motor_power", "rod2.yaw")  # fmt: skip
     for k, (mass, push) in enumerate(zip(MASSES, PUSHES, strict=True)):
@@ -67,7 +67,7 @@ def test_each_run_has_the_quantities_of_a_single_one(model: Model, batch: Batch)
         batch.run(1).certificate  # noqa: B018
 
 
-def test_as_a_dataset_and_in_a_file(batch: Batch, tmp_path: Path) -> None:
+def test_as_a_dataset_and_in_a_file(batch: BatchResult, tmp_path: Path) -> None:
     data = batch.to_xarray()
     assert dict(data.sizes) | {"run": 3, "time": 6} == dict(data.sizes)
     tip = data["position"].sel(body="rod2.tip").values
@@ -84,7 +84,7 @@ def test_as_a_dataset_and_in_a_file(batch: Batch, tmp_path: Path) -> None:
         batch.save(tmp_path / "many.csv")
 
 
-def test_lines_for_few_runs_and_a_band_for_many(batch: Batch, tmp_path: Path) -> None:
+def test_lines_for_few_runs_and_a_band_for_many(batch: BatchResult, tmp_path: Path) -> None:
     (axis,) = batch.plot("energy", path=tmp_path / "few.png").axes
     assert [line.get_label() for line in axis.lines] == ["run 0", "run 1", "run 2"]
     (axis,) = batch.plot("energy", band=True).axes
@@ -134,6 +134,6 @@ def test_batches_without_states_say_so() -> None:
 
 
 @pytest.mark.parametrize("band", [False, True])
-def test_what_batches_do_not_integrate_is_refused(batch: Batch, band: bool) -> None:
+def test_what_batches_do_not_integrate_is_refused(batch: BatchResult, band: bool) -> None:
     with pytest.raises(mstmm.SceneError, match='"work": batches do not integrate it'):
         batch.plot("work", band=band)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.written_out import plain_name, written_out
+from support.expanded_chains import plain_name, written_out
 
 import mstmm
 from mstmm.errors import SceneError

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.run.second_opinion import Equations
+from mstmm.runtime.run.external_integrators import Equations
 
 ENGINES = ["looped", "fused"]
 MASS, STIFFNESS, DAMPING, TS = 2.0, 30.0, 0.4, 0.05

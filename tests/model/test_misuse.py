@@ -28,7 +28,7 @@ def model() -> mstmm.Model:
         (lambda model: model.linearize().symbolic(3), "keep = 3: expected a list of names"),
         (lambda model: model.simulate(0.0).certificate.verdict("a"), "accuracy = 'a'"),
         (lambda model: model.simulate(0.0).certificate.verdict(0.1, "a"), "balance = 'a'"),
-        (lambda _: mstmm.report(None, "x.html"), "report: expected a result"),  # type: ignore[arg-type]
+        (lambda _: mstmm.write_report(None, "x.html"), "report: expected a result"),  # type: ignore[arg-type]
     ],
 )  # fmt: skip
 def test_wrong_kinds_are_refused(

@@ -14,7 +14,7 @@ import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.model import session
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.run.stability import check_step
+from mstmm.runtime.run.step_stability import check_step
 
 ENGINES = ["looped", "fused"]
 FIXED = ["rk4", "dop853", "rodas4p2", "genalpha"]

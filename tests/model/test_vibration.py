@@ -9,9 +9,9 @@ import pytest
 
 import mstmm
 from mstmm.runtime.integrate.settings import Settings
-from mstmm.runtime.model.wanted.family import Family
-from mstmm.runtime.model.wanted.looks import Kind
-from mstmm.runtime.model.wanted.vibration import Vibration, vibration
+from mstmm.runtime.model.target_error.error_extrapolation import Kind
+from mstmm.runtime.model.target_error.initial_vibration import Vibration, vibration
+from mstmm.runtime.model.target_error.method_choice import Family
 
 _ASKED = 1e-6
 

@@ -10,7 +10,7 @@ import pytest
 import scipy.integrate
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 Scene = dict[str, Any]
 

@@ -11,7 +11,7 @@ from support.result_scenes import motor, pins, rod, tree
 from support.rod_scenes import chain, drawn_state, precise_accelerations
 
 import mstmm
-from mstmm.runtime.engine.motions import fastest
+from mstmm.runtime.engine.eigenvalues import fastest_eigenvalue
 from mstmm.runtime.result.certificate import Certificate
 from mstmm.runtime.result.result import Result
 
@@ -257,19 +257,20 @@ def test_the_fastest_motion_of_a_pin_with_a_law(
     stiffness: float, damping: float, rate: float
 ) -> None:
     engine = mstmm.compile(motor("0", stiffness=stiffness, damping=damping)).looped
-    value, _ = fastest(engine, 0.0, np.array([0.3, 0.0]), engine.start_memory())
+    value, _ = fastest_eigenvalue(engine, 0.0, np.array([0.3, 0.0]), engine.start_memory())
     assert abs(value) == pytest.approx(rate, rel=1e-6)
 
 
 def test_the_fastest_motion_of_a_long_chain_is_found_without_a_dense_matrix() -> None:
-    from mstmm.runtime.engine import motions
+    from mstmm.runtime.engine import eigenvalues
 
     engine = mstmm.compile(pins(90, [0.05, -0.1] * 45, stiffness=1e4)).looped
     y = np.concatenate([np.tile([0.05, -0.1], 45), np.zeros(90)])
     dense = np.linalg.eigvals(
-        motions._differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180)) / 1e-6
+        eigenvalues._central_differences(engine, 0.0, y, engine.start_memory(), 1e-6 * np.eye(180))
+        / 1e-6
     )
-    value, _ = fastest(engine, 0.0, y, engine.start_memory())
+    value, _ = fastest_eigenvalue(engine, 0.0, y, engine.start_memory())
     assert abs(value) == pytest.approx(np.abs(dense).max(), rel=0.05)
 
 

@@ -13,14 +13,14 @@ import pytest
 from scene.scenes import body
 
 import mstmm
-from mstmm.bridge.compilation import compile_level
 from mstmm.errors import SceneError
-from mstmm.runtime.advice.outputs import with_outputs_there
-from mstmm.runtime.advice.splitting import in_parts
-from mstmm.runtime.chart.models import at_level
-from mstmm.runtime.engine.shown import SUMS
+from mstmm.pipeline.compilation import compile_level
+from mstmm.runtime.advice.beam_splitting import in_parts
+from mstmm.runtime.advice.reduced_outputs import with_outputs_there
+from mstmm.runtime.chart.model_levels import at_level
+from mstmm.runtime.engine.observation_columns import SUMS
 from mstmm.runtime.result.result import Result
-from mstmm.scene.checks.inputs import OF_SCENE
+from mstmm.scene.checks.inputs import SCENE_QUANTITIES
 
 
 def scene(*outputs: dict[str, Any], **tables: Any) -> mstmm.Scene:
@@ -121,7 +121,7 @@ def test_the_scene_is_written_as_it_is_read() -> None:
 
 
 def test_quantities_of_the_scene_are_known_by_name() -> None:
-    assert {name.partition(".")[0] for name in SUMS} | {"work"} == set(OF_SCENE)
+    assert {name.partition(".")[0] for name in SUMS} | {"work"} == set(SCENE_QUANTITIES)
     for wrong in (3, None, ["energy"]):
         with pytest.raises(SceneError, match="expected a name, such as energy"):
             result().quantity(wrong)  # type: ignore[arg-type]

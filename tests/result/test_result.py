@@ -268,9 +268,9 @@ def test_arrays_that_are_kept_cannot_be_changed(run: Result) -> None:
 def test_quantities_come_out_the_same_in_small_batches(
     run: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from mstmm.runtime.result import observed
+    from mstmm.runtime.result import observations
 
-    monkeypatch.setattr(observed, "_BATCH", 10)
+    monkeypatch.setattr(observations, "_MAX_BATCH_NUMBERS", 10)
     other = Result(run.model, run.trajectory)
     for name in ("arm.tip.position", "wrist.force", "energy", "elbow.effort[0]", "space.vx_dot"):
         np.testing.assert_array_equal(run.quantity(name).values, other.quantity(name).values)

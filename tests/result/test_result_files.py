@@ -18,8 +18,8 @@ from scipy.io import loadmat, savemat
 from support.result_scenes import motor, pins, tree
 
 import mstmm
-from mstmm.runtime.result.output.columns import Columns
-from mstmm.runtime.result.output.tabled import matlab_names
+from mstmm.runtime.result.export.column_files import ColumnFile
+from mstmm.runtime.result.export.csv_and_mat import matlab_names
 from mstmm.runtime.result.result import Result
 
 
@@ -136,7 +136,7 @@ def test_csv_has_names_units_and_every_digit(run: Result, tmp_path: Path) -> Non
 def test_columns_come_back_from_tables(run: Result, tmp_path: Path, ending: str) -> None:
     path = run.save(tmp_path / f"run.{ending}")
     again = mstmm.load_result(path)
-    assert isinstance(again, Columns) and len(again.names()) > 200
+    assert isinstance(again, ColumnFile) and len(again.names()) > 200
     np.testing.assert_array_equal([again.t, again.event], [run.t, run.event])
     for name in again.names():
         ours, theirs = again.quantity(name), run.quantity(name)
@@ -339,7 +339,7 @@ def test_changed_bytes_never_reach_the_library(
     whole = path.read_bytes()
     with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
         np.testing.assert_array_equal(file["q"], run.q)  # others read it as it is
-    monkeypatch.delattr("mstmm.runtime.model.loading._read")
+    monkeypatch.delattr("mstmm.runtime.model.result_loading._read")
     for place in (0, 600, len(whole) // 2, len(whole) - 100):
         path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
         with pytest.raises(mstmm.SceneError, match="damaged, or was changed since it was written"):

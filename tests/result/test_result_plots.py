@@ -13,10 +13,10 @@ from support.models import model_of
 from support.result_scenes import motor, pins, tree
 
 import mstmm
-from mstmm.runtime.result.names import Quantity
-from mstmm.runtime.result.plotting.choice import choose
-from mstmm.runtime.result.plotting.curves import curve
+from mstmm.runtime.result.plotting.curve_interpolation import curve
+from mstmm.runtime.result.plotting.default_quantities import choose_panels
 from mstmm.runtime.result.plotting.spectra import spectrum
+from mstmm.runtime.result.quantity_names import Quantity
 from mstmm.runtime.result.result import Result
 
 
@@ -55,7 +55,7 @@ def test_curves_between_samples_follow_the_motion() -> None:
 def test_of_many_hinges_those_are_drawn_that_move_most() -> None:
     scene = pins(40, [0.1 * k for k in range(40)])
     run = mstmm.compile(scene, engine="looped").simulate(0.2, output_times=np.linspace(0, 0.2, 9))
-    (chosen,) = choose(run)
+    (chosen,) = choose_panels(run)
     moved = np.ptp(run.q, axis=0)
     largest = sorted(np.argsort(-moved)[:6].tolist())
     assert chosen.names == tuple(f"pin{k}.angle" for k in largest)

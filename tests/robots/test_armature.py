@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import mstmm
-from mstmm.scene.robots.convert import Choices, converted
-from mstmm.scene.robots.robot import Joint, Link, Robot
+from mstmm.scene.robots.robot_model import Joint, Link, Robot
+from mstmm.scene.robots.scene_from_robot import ImportOptions, scene_from_robot
 
 
 def test_it_accelerates_along_inertial_axes() -> None:
@@ -18,7 +18,7 @@ def test_it_accelerates_along_inertial_axes() -> None:
     body = Link("a", mass, (0.1, 0.2, -0.3), inertia)
     joint = Joint("float it", "free", "world", "a", keys={"law": law, "armature": armature})
     robot = Robot("", "a.xml", (Link("world"), body), (joint,), gravity=(0.3, -0.4, -9.81))
-    found = mstmm.compile(converted(robot, Choices()).scene)
+    found = mstmm.compile(scene_from_robot(robot, ImportOptions()).scene)
     v, w = np.array([0.7, -1.1, 0.4]), np.array([1.3, 0.6, -0.9])  # in the body's axes
     gravity = np.array([0.3, -0.4, -9.81])  # the body's axes are inertial at this moment
     skew = np.cross(np.eye(3), r)  # skew y = r x y

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from robots.test_urdf import written
 
 #: A cart on a rail along x, and on it a pole about y that hangs down at 0.

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.numbers.rotations import from_rpy, to_rpy
-from mstmm.scene import Rated
+from mstmm.numerics.rotations import from_rpy, to_rpy
+from mstmm.scene import HingeRating
 from robots.test_urdf import ARM, written
 
 HINGES: tuple[dict[str, Any], ...] = (
@@ -191,8 +191,8 @@ def test_three_angles_give_the_rotation_again(rng: np.random.Generator) -> None:
 def test_what_joints_are_rated_for_comes_back(tmp_path: Path, stops: float | None) -> None:
     first = mstmm.import_robot(written(tmp_path, ARM), stops=stops)
     shoulder, jaw, other = first.scene.hinge
-    assert shoulder.rated == Rated(lower=-1.0, upper=2.0, effort=30.0, velocity=5.0)
-    assert jaw.rated == Rated(lower=0.0, upper=0.04) and other.rated is None
+    assert shoulder.rated == HingeRating(lower=-1.0, upper=2.0, effort=30.0, velocity=5.0)
+    assert jaw.rated == HingeRating(lower=0.0, upper=0.04) and other.rated is None
     text = mstmm.export_robot(first.scene).text
     assert '<limit lower="-1.0" upper="2.0" effort="30.0" velocity="5.0" />' in text
     again = mstmm.load_scene(written(tmp_path, text, "again.urdf"))
@@ -203,7 +203,7 @@ def test_what_joints_are_rated_for_comes_back(tmp_path: Path, stops: float | Non
 def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
     wheel = ARM.replace('"revolute"', '"continuous"').replace('"30"', '"-1"')
     found = mstmm.import_robot(written(tmp_path, wheel))
-    assert found.scene.hinge[0].rated == Rated(velocity=5.0)
+    assert found.scene.hinge[0].rated == HingeRating(velocity=5.0)
     assert "limits of effort or velocity below 0 left out" in [note.text for note in found.notes]
     text = mstmm.export_robot(found.scene).text
     assert 'type="continuous"' in text and '<limit effort="1000000000.0" velocity="5.0" />' in text
@@ -212,7 +212,7 @@ def test_a_wheel_is_rated_without_a_range(tmp_path: Path) -> None:
 @pytest.mark.parametrize("value", ["inf", "nan", "", "many"])
 def test_ratings_that_are_no_numbers_are_left_out(tmp_path: Path, value: str) -> None:
     found = mstmm.import_robot(written(tmp_path, ARM.replace('"30"', f'"{value}"')))
-    assert found.scene.hinge[0].rated == Rated(lower=-1.0, upper=2.0, velocity=5.0)
+    assert found.scene.hinge[0].rated == HingeRating(lower=-1.0, upper=2.0, velocity=5.0)
     told = f"limits that are not finite numbers left out: effort '{value}'"
     assert told in [note.text for note in found.notes]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import mstmm
-from mstmm.scene.robots.mjcf_files import looked_through
+from mstmm.scene.robots.mjcf_includes import check_included_files
 
 ENTITY = '<!DOCTYPE mujoco [<!ENTITY a SYSTEM "/etc/hostname">]><mujoco model="&a;"/>'
 
@@ -56,7 +56,7 @@ def test_files_below_are_looked_through_once_each(tmp_path: Path) -> None:
         )
         .encode()
     )
-    places = looked_through(content, tmp_path / "robot.xml", "robot.xml")
+    places = check_included_files(content, tmp_path / "robot.xml", "robot.xml")
     assert places == {
         ("body", "arm"): "parts/a.xml: line 2", ("equality", "arm"): "robot.xml: line 2",
         ("joint", "arm"): "robot.xml: line 2",
@@ -148,4 +148,4 @@ def test_assets_of_the_own_folder_pass(tmp_path: Path) -> None:
         '<hfield nrow="100" ncol="100"/><texture width="512" height="512"/></asset>'
         '<worldbody><replicate count="50"><geom size="1"/></replicate></worldbody></mujoco>'
     )
-    assert looked_through(text.encode(), tmp_path / "robot.xml", "robot.xml") == {}
+    assert check_included_files(text.encode(), tmp_path / "robot.xml", "robot.xml") == {}

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.scene.robots.convert import Choices, Imported, converted
-from mstmm.scene.robots.robot import Joint, Link, Mimic, Robot
+from mstmm.scene.robots.robot_model import Joint, Link, Mimic, Robot
+from mstmm.scene.robots.scene_from_robot import ImportedRobot, ImportOptions, scene_from_robot
 from robots.test_mimics import chain, pin
 from robots.test_urdf import ARM, joint, robot, written
 
@@ -53,7 +53,7 @@ IN_MM = """<robot><link name="base"/>
 </robot>"""
 
 
-def told(found: Imported) -> list[str]:
+def told(found: ImportedRobot) -> list[str]:
     return [f"{note.element}: {note.text}" for note in found.notes]
 
 
@@ -140,7 +140,7 @@ def test_several_trees_stand_side_by_side() -> None:
         links += [Link(f"{name}0"), Link(f"{name}1", 1.0, (out, 0.0, 0.0), unit)]
         keys = {"axis": (0.0, 1.0, 0.0)}
         joints.append(Joint(name, "pin", f"{name}0", f"{name}1", keys=keys))
-    found = converted(Robot("two", "two.urdf", tuple(links), tuple(joints)), Choices())
+    found = scene_from_robot(Robot("two", "two.urdf", tuple(links), tuple(joints)), ImportOptions())
     assert [hinge.inboard for hinge in found.scene.hinge] == ["ground", "ground"]
     swings = mstmm.compile(found.scene).accelerations([0.0, 0.0], [0.0, 0.0])
     assert swings == pytest.approx([9.81 * out / (1 + out**2) for out in (0.3, 0.6)], rel=1e-14)
@@ -151,7 +151,7 @@ def test_of_two_mimics_of_a_joint_the_last_one_counts() -> None:
     mimics = (
         Mimic("j2", "j0", 2.0, 0.0), Mimic("j2", "j1", 3.0, 0.0), Mimic("j2", "none", 1.0, 0.0)
     )  # fmt: skip
-    found = converted(chain(pin(0), pin(1), pin(2), mimics=mimics), Choices())
+    found = scene_from_robot(chain(pin(0), pin(1), pin(2), mimics=mimics), ImportOptions())
     assert "joint 'j2': several <mimic>: the last one applies, not 'j0'" in told(found)
     (coupling,) = found.scene.coupling
     assert [name.text for name in coupling.names] == ["j2.q", "j1.q"]

@@ -17,8 +17,8 @@ import pytest
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.runtime.integrate.loop import Run
-from mstmm.runtime.run import execution
+from mstmm.runtime.integrate.c_loop import Integrator
+from mstmm.runtime.run import run_execution
 
 #: Runs a scene from a file; says where it is and waits for a line, so that the parent can
 #: interrupt it half-way.
@@ -109,13 +109,13 @@ def test_ctrl_c_and_resume_give_the_bytes_of_an_uninterrupted_run(
 
 def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
     """Ctrl-C, from within, as soon as a run has passed this time."""
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
-    def look(self: execution.Watch, run: Run, earlier: object) -> None:
+    def look(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
         if run.t > at:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(execution.Watch, "look", look)
+    monkeypatch.setattr(run_execution.RunMonitor, "look", look)
 
 
 def test_a_checkpoint_of_another_run_is_refused(
@@ -228,8 +228,8 @@ def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = mstmm.compile(pins(2, [0.3, 0.4]))
-    monkeypatch.setattr(execution, "CHECKPOINT_EVERY", 0.0)
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr(run_execution, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -245,8 +245,8 @@ def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
 def test_checkpoints_are_written_on_the_way(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(execution, "CHECKPOINT_EVERY", 0.0)
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr(run_execution, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     path, seen = tmp_path / "run.npz", list[int]()
 
     def progress(t: float, t_end: float) -> None:
@@ -276,7 +276,7 @@ def test_a_run_that_has_ended_is_kept_until_its_result_is_saved(
         raise AssertionError("a step")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Run, "advance", never)
+        patch.setattr(Integrator, "advance", never)
         again = model.simulate(5.0, checkpoint=path, resume=True)
     assert (again.message, again.status) == (first.message, first.status)
     assert again.q.tobytes() == first.q.tobytes() and again.statistics == first.statistics
@@ -289,7 +289,7 @@ def test_a_run_that_has_ended_is_kept_until_its_result_is_saved(
 
 @pytest.mark.parametrize("certify", [False, True])
 def test_progress_grows_to_the_end(monkeypatch: pytest.MonkeyPatch, certify: bool) -> None:
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     told = list[tuple[float, float]]()
     model = mstmm.compile(pins(1, [0.3]))
     run = model.simulate(2.0, progress=lambda *x: told.append(x), certify=certify)
@@ -306,7 +306,7 @@ class CallerError(Exception):
 def test_an_exception_of_a_progress_callback_ends_the_run(
     monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     model, step = mstmm.compile(pins(1, [0.3])), 0.01 if method == "dttmm-classical" else None
     calls = list[float]()
 
@@ -324,7 +324,7 @@ def test_an_exception_of_a_progress_callback_ends_the_run(
 def test_an_exception_of_a_progress_callback_ends_several_runs(
     monkeypatch: pytest.MonkeyPatch, asked: dict[str, Any]
 ) -> None:
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
     def progress(t: float, t_end: float) -> None:
         if t > 0.6 * t_end:  # not in the first run
@@ -337,7 +337,7 @@ def test_an_exception_of_a_progress_callback_ends_several_runs(
 def test_a_run_goes_on_from_where_a_progress_callback_ended_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
 
     def progress(t: float, t_end: float) -> None:
@@ -362,13 +362,13 @@ def test_settings_of_a_result_are_plain_numbers(tmp_path: Path) -> None:
 def test_ctrl_c_in_the_second_run_costs_the_estimate_only(
     heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
-    def look(self: execution.Watch, run: Run, earlier: object) -> None:
+    def look(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
         if self.run == 1 and run.t > 0.5:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(execution.Watch, "look", look)
+    monkeypatch.setattr(run_execution.RunMonitor, "look", look)
     run = mstmm.compile(pins(1, [0.3])).simulate(2.0, certify=True)
     assert run.success and run.t[-1] == 2.0 and run.certificate.error is None
     assert any("interrupted" in text for text in run.warnings)

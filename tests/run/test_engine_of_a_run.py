@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.integration_lab import same_bits
+from support.integration_helpers import same_bits
 from support.rod_scenes import chain
 
 import mstmm
 from mstmm.errors import EnvironmentFailure
 from mstmm.runtime.model.model import Model
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run import simulate
+from mstmm.runtime.run import integration_run
 
 LONG: dict[str, Any] = {"t_end": 12000.0, "rtol": 1e-6, "atol": 1e-8, "output_times": [12000.0]}
 SHORT: dict[str, Any] = {"t_end": 2.0, "rtol": 1e-9, "atol": 1e-11}
@@ -82,7 +82,9 @@ def test_work_and_samples_agree_with_the_looped_engine(method: str) -> None:
 def test_an_interrupted_run_on_compiled_code_continues_bit_for_bit(
     empty_cache: Path, heard: None, monkeypatch: pytest.MonkeyPatch, method: str
 ) -> None:
-    monkeypatch.setattr(simulate, "SLICE", 0.001)  # else a fast machine has done before Ctrl-C
+    monkeypatch.setattr(
+        integration_run, "SLICE", 0.001
+    )  # else a fast machine has done before Ctrl-C
     settings: dict[str, Any] = {
         "t_end": 1000.0, "method": method, "rtol": 1e-8, "atol": 1e-10,
         "output_times": [3.0, 400.0, 1000.0], "checkpoint": empty_cache / "run.npz",

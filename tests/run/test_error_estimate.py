@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from support.result_scenes import motor, pins, rod
 
 import mstmm
-from mstmm.runtime.result.observed import quaternions
+from mstmm.runtime.result.observations import quaternions
 from mstmm.runtime.result.result import Result
 from mstmm.runtime.run.error_estimate import SAFETY, ErrorEstimate, compare
 

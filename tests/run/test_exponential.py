@@ -8,12 +8,12 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
-from stiff import motions
+from implicit_methods import motions
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.integrate.steppers import get
 from mstmm.runtime.model.model import Model
 

@@ -11,7 +11,7 @@ from support.result_scenes import motor, pins, rod
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.result.result import Result
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from implicit_methods import motions
 from run.test_checkpoint import interrupted
 from run.test_simulate_batch import compiled
-from stiff import motions
-from support.integration_lab import same_bits
+from support.integration_helpers import same_bits
 
 import mstmm
 from mstmm.runtime.integrate.steppers import IMPLICIT, get

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flexible.beam.test_beams_at_rest import elastica, tip, welded
-from stiff import motions
+from implicit_methods import motions
 
 import mstmm
 from mstmm.runtime.model.model import Model

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.runtime.integrate.steppers import get
 
 COUNT = 200

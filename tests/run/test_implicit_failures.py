@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from implicit_methods import motions
 from run.test_failures import check_remains, singular
-from stiff import motions
 from support.result_scenes import pins
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
-from mstmm.runtime.integrate.steppers.implicit import Alpha, Exponential, Implicit
+from mstmm.runtime.integrate.steppers.implicit_methods import Exponential, Implicit, NewmarkFamily
 
 #: Those whose stages solve equations, which a motion that leaves by itself can make indefinite.
 SOLVING = [
@@ -75,7 +75,7 @@ def standing(stiffness: float) -> mstmm.Scene:
 
 def part_of_a_step(method: Implicit) -> float:
     """c of Z = M + C c' h + K (c h)^2, of the equations that a stage solves."""
-    if isinstance(method, Alpha):
+    if isinstance(method, NewmarkFamily):
         return float(np.sqrt(method.beta_n * (1 - method.alpha_f) / (1 - method.alpha_m)))
     return method.gamma
 

@@ -9,7 +9,7 @@ import pytest
 from support.result_scenes import rod
 
 import mstmm
-from mstmm.runtime.integrate.loop import Status
+from mstmm.runtime.integrate.c_loop import Status
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
 from mstmm.runtime.model.model import Model
 

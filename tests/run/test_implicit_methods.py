@@ -10,11 +10,11 @@ from support.result_scenes import rod
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.integrate.loop import Run, Samples, Status
-from mstmm.runtime.integrate.settings import Settings, checked
+from mstmm.runtime.integrate.c_loop import Integrator, Samples, Status
+from mstmm.runtime.integrate.settings import Settings, validate
 from mstmm.runtime.integrate.steppers import IMPLICIT, get
-from mstmm.runtime.run.simulate import make_run
-from mstmm.runtime.run.system import SceneSystem
+from mstmm.runtime.run.integration_run import make_run
+from mstmm.runtime.run.scene_system import SceneSystem
 
 
 def remembering() -> mstmm.Scene:
@@ -84,10 +84,10 @@ def test_stiff_springs_do_not_set_the_step(method: str) -> None:
 )  # fmt: skip
 def test_a_scene_continues_bit_for_bit_from_every_step(method: str, how: dict[str, Any]) -> None:
     model = mstmm.compile(remembering(), engine="looped")
-    settings = checked(Settings(1.2, method=method, atol=1e-6, **how))
+    settings = validate(Settings(1.2, method=method, atol=1e-6, **how))
     systems: list[SceneSystem] = []
 
-    def fresh() -> Run:
+    def fresh() -> Integrator:
         systems.append(SceneSystem(model.looped))
         return make_run(systems[-1], settings, *model.initial_state())
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from stiff import motions
+from implicit_methods import motions
 
 import mstmm
 from mstmm.runtime.integrate.steppers import IMPLICIT, get

@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.integration_lab import same_bits
+from support.integration_helpers import same_bits
 from support.result_scenes import pins
 
 import mstmm
 from benchmarks.stiff import references, scenes
 from benchmarks.stiff.cases import CASES
-from mstmm.runtime.integrate.loop import Run
+from mstmm.runtime.integrate.c_loop import Integrator
 from mstmm.runtime.integrate.steppers import get, register
 from mstmm.runtime.model.model import Model
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.run import execution
-from mstmm.runtime.run.system import SceneSystem
+from mstmm.runtime.run import run_execution
+from mstmm.runtime.run.scene_system import SceneSystem
 
 LOOSE: dict[str, Any] = {"rtol": 1e-4, "atol": 1e-6}
 ARRAYS = ("t", "q", "u", "work", "event")
@@ -150,7 +150,7 @@ def test_slices_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     model = compiled(eventful())
     options: dict[str, Any] = {"method": "auto", "rtol": 1e-6}
     whole = model.simulate(2.0, **options)
-    monkeypatch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
+    monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     cut = model.simulate(2.0, **options)
     assert equal(cut, whole) and cut.methods == whole.methods
     assert cut.statistics == whole.statistics
@@ -162,7 +162,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
 ) -> None:
     """Interrupted before the change and after it; events and a release lie behind."""
 
-    def look(self: execution.Watch, run: Run, earlier: object) -> None:
+    def look(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
         if run.t > at:
             signal.raise_signal(signal.SIGINT)
 
@@ -170,8 +170,8 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
     options: dict[str, Any] = {"method": "auto", "rtol": 1e-6}
     whole = model.simulate(2.0, **options)
     with monkeypatch.context() as patch:
-        patch.setattr("mstmm.runtime.run.simulate.SLICE", 0.0)
-        patch.setattr(execution.Watch, "look", look)
+        patch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
+        patch.setattr(run_execution.RunMonitor, "look", look)
         part = model.simulate(2.0, checkpoint=path, **options)
     assert part.status is None and (len(part.methods) == 1) == (at == 0.001)
     rest = model.simulate(2.0, checkpoint=path, resume=True, **options)
@@ -231,7 +231,7 @@ def test_scenes_without_implicit_methods_stay_explicit(monkeypatch: pytest.Monke
 
     model = compiled(CASES["f"].scene())
     plain = model.simulate(0.03, **LOOSE)
-    monkeypatch.setattr("mstmm.runtime.run.fastest.Tangent", refused)
+    monkeypatch.setattr("mstmm.runtime.run.spectral_radius.TangentMatrix", refused)
     run = model.simulate(0.03, method="auto", **LOOSE)
     assert equal(run, plain) and names(run) == ["dop853", "dop853"]
     assert run.methods[1].why == 'stays: hinge "cam" has no derivatives'

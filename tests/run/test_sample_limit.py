@@ -6,12 +6,12 @@ import pytest
 from support.result_scenes import pins
 
 import mstmm
-from mstmm.runtime.run import simulate
+from mstmm.runtime.run import integration_run
 
 
 def test_a_run_stops_before_its_samples_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulate, "LARGEST", 2**20)
-    monkeypatch.setattr(simulate, "SLICE", 0.01)
+    monkeypatch.setattr(integration_run, "LARGEST", 2**20)
+    monkeypatch.setattr(integration_run, "SLICE", 0.01)
     model = mstmm.compile(pins(2, [0.3, 0.4]))
     run = model.simulate(1e6, "rk4", 1e-4)
     assert not run.success and "ask for output times" in run.message

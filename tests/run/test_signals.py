@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.run import simulate
+from mstmm.runtime.run import integration_run
 
 TIMES = (0.0, 0.5, 1.3, 2.0, 3.0)
 
@@ -244,7 +244,9 @@ def test_derivatives_by_time_are_those_of_the_cubic(t: float) -> None:
 def test_an_interrupted_run_goes_on_bit_for_bit(
     engine: str, tmp_path: Path, heard: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(simulate, "SLICE", 0.001)  # else a fast machine has done before Ctrl-C
+    monkeypatch.setattr(
+        integration_run, "SLICE", 0.001
+    )  # else a fast machine has done before Ctrl-C
     model = arm(engine, "wind")
     settings: dict[str, Any] = {
         "t_end": 3.0,

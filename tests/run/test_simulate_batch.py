@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
-from support.integration_lab import same_bits
+from support.integration_helpers import same_bits
 
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.run.batch import threads as on_threads
+from mstmm.runtime.run.batch import interruptible_threads as on_threads
 
 RUN: dict[str, Any] = {"t_end": 1.5, "rtol": 1e-9, "atol": 1e-11, "output_times": [0.4, 1.1, 1.5]}
 ENGINES = ("looped", "fused")

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 from engine.test_tangent import flexible, rigid, worst
+from implicit_methods import motions
 from numpy.random import Generator
 from reference.jets import Array
-from stiff import motions
 
 import mstmm
-from mstmm.runtime.engine.jacobian import Jacobian
-from mstmm.runtime.run.system import SceneSystem
+from mstmm.runtime.engine.jacobian import OdeJacobian
+from mstmm.runtime.run.scene_system import SceneSystem
 
 Scene = dict[str, Any]
 TIME = 0.3
@@ -71,7 +71,7 @@ class Offer:
 def check(scene: Scene, q: Array, u: Array) -> None:
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     offer = Offer(model, q, u)
-    expected = Jacobian(model, False, offer.system.memory, lambda t, y: np.full_like(y, np.nan))
+    expected = OdeJacobian(model, False, offer.system.memory, lambda t, y: np.full_like(y, np.nan))
     assert expected.exact
     assert worst(offer.state_matrix(), expected(TIME, offer.y)) < 1e-10
 

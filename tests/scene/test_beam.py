@@ -14,8 +14,8 @@ from mstmm.errors import SceneError
 from mstmm.expression.expression import parse
 from mstmm.scene import Scene, load_scene
 from mstmm.scene.checks import topology
-from mstmm.scene.tables.rigid import rigid_beam
-from mstmm.scene.tables.shapes import ShapeFunction, shape_at
+from mstmm.scene.tables.rigid_equivalent import rigid_body_of_beam
+from mstmm.scene.tables.shape_functions import ShapeFunction, shape_at
 from scene.scenes import Data, bladed, hinge
 
 WHOLE = """
@@ -160,7 +160,7 @@ def test_the_skeleton_has_the_same_tree_with_rigid_bodies() -> None:
     skeleton = scene.skeleton
     names = [b.name for b in skeleton.bodies]
     assert names == ["rod", "blade", "rope[0]", "rope[1]", "rope[2]"]
-    tree = topology.build(skeleton)
+    tree = topology.build_topology(skeleton)
     assert [names[i] for i in tree.order] == ["blade", "rope[0]", "rope[1]", "rope[2]", "rod"]
     assert tree.links[0].outboard_end == "mid" and tree.links[1].inboard_end == "tip"
     rigid = Scene(body=[rod], hinge=[hinge(outboard="rod")], gravity=[0, 0, 0])
@@ -174,7 +174,7 @@ def test_the_rigid_beam_has_the_mass_and_inertia_of_its_pieces() -> None:
         {"from": 3, "to": 10, "mass_per_length": 0.5, "rotary_inertia": [0.2, 0.1]},
     ]
     scene = Scene(**bladed(section=pieces, mass_per_length=...))
-    body = rigid_beam(scene.beam[0])
+    body = rigid_body_of_beam(scene.beam[0])
     n = 20_000
     slices = [(10 * (k + 0.5) / n, 10 / n) for k in range(n)]
     line = [(x, (2.0 if x < 3 else 0.5) * dx) for x, dx in slices]

@@ -10,7 +10,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from mstmm.scene.rules.symmetric import full
+from mstmm.scene.validators.symmetric_matrices import full_matrix
 from scene.scenes import Data, arm
 
 SIX = [1.0, 2, 3, 4, 5, 6]
@@ -26,9 +26,9 @@ def mounted(**changes: Any) -> Data:
 def test_matrices_as_they_are_written() -> None:
     upper = FULL[np.triu_indices(6)].tolist()
     for given in (FULL.tolist(), upper, FULL):
-        assert full(Scene(**mounted(damping=given)).bushing[0].damping) == FULL.tolist()
+        assert full_matrix(Scene(**mounted(damping=given)).bushing[0].damping) == FULL.tolist()
     (one,) = Scene(**mounted()).bushing
-    assert full(one.stiffness) == np.diag(SIX).tolist()
+    assert full_matrix(one.stiffness) == np.diag(SIX).tolist()
 
 
 def test_a_file_holds_it_all() -> None:
@@ -51,14 +51,14 @@ def test_matrices_of_bearings() -> None:
     (one,) = Scene(**mounted(stiffness=across, damping=skew(1.0), conservative=False)).bushing
     known = np.zeros((6, 6))
     known[1:3, 1:3] = across
-    np.testing.assert_array_equal(full(one.stiffness), known)
-    np.testing.assert_array_equal(full(one.damping), skew(1.0))
+    np.testing.assert_array_equal(full_matrix(one.stiffness), known)
+    np.testing.assert_array_equal(full_matrix(one.damping), skew(1.0))
     assert one.element == "bearing6"
     scene = Scene(**mounted(stiffness=known, conservative=False))
     assert scene.bushing[0].element == "bearing3"
     assert Scene.from_data(tomllib.loads(scene.to_toml())) == scene
     (gaining,) = Scene(**mounted(stiffness=[-1.0, *SIX[1:]], conservative=False)).bushing
-    assert full(gaining.stiffness)[0][0] == -1
+    assert full_matrix(gaining.stiffness)[0][0] == -1
 
 
 BAD = [

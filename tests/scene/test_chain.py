@@ -80,7 +80,7 @@ def test_a_chain_is_one_run_whatever_its_length() -> None:
         hinge=[hinge("g", inboard="rope[2].tip", outboard="load"), hinge("h", outboard="base")],
         chain=[chain("rope", count=1000, inboard="base.tip"), chain("side", inboard="rope[7].tip")],
     )  # fmt: skip
-    tree = topology.build(scene)
+    tree = topology.build_topology(scene)
     assert [(run.body, run.count, run.place, run.parent) for run in tree.runs] == [
         (1, 1, 0, -1), (2, 1000, 1, 0), (1002, 5, 1001, 8), (0, 1, 1006, 3),
     ]  # fmt: skip
@@ -93,14 +93,14 @@ def test_a_chain_is_one_run_whatever_its_length() -> None:
         assert tree.at(place) == (link.body, link.hinge)
         assert tree.place_of_body(link.body) == tree.position[link.body] == place
         assert tree.place_of_hinge(link.hinge) == place
-    assert not is_chain(tree) and is_chain(topology.build(Scene(**roped())))
+    assert not is_chain(tree) and is_chain(topology.build_topology(Scene(**roped())))
 
 
 def test_subtrees_are_contiguous() -> None:
     """Depth first: the descendants of every body stand right behind it."""
     chains = [chain("a"), chain("b", inboard="a[1].tip"), chain("c", inboard="a[3].tip"),
               chain("d", inboard="b[last].tip"), chain("e", inboard="a[1].tip")]  # fmt: skip
-    tree = topology.build(Scene(gravity=[0, 0, 0], chain=chains))
+    tree = topology.build_topology(Scene(gravity=[0, 0, 0], chain=chains))
     size = [1] * tree.count
     for place in range(tree.count - 1, 0, -1):
         if tree.parents[place] >= 0:

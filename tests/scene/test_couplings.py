@@ -8,7 +8,7 @@ import pytest
 
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
-from mstmm.scene.checks.closures import coordinate
+from mstmm.scene.checks.loop_closures import resolve_coordinate
 from scene.scenes import arm, beam, body, hinge
 
 
@@ -27,7 +27,7 @@ def coupled(*couplings: dict[str, Any], **hinges: dict[str, Any]) -> dict[str, A
 def test_coordinates_go_by_number_or_by_their_own_name() -> None:
     text = "shoulder.angle + 2*elbow.displacement*elbow.q[1] + shoulder.q"
     scene = Scene(**coupled({"expression": text}))
-    assert [coordinate(scene, name) for name in scene.coupling[0].names] == [
+    assert [resolve_coordinate(scene, name) for name in scene.coupling[0].names] == [
         (0, "q", 0), (1, "q", 0), (1, "q", 1), (0, "q", 0),
     ]  # fmt: skip
 
@@ -37,7 +37,7 @@ def test_speeds_may_have_factors_that_depend_on_coordinates() -> None:
     others = ("shoulder.u - 2*elbow.u[1]", "wrist.q[0]*wrist.u[0]")
     scene = Scene(**coupled(rolling, *({"speeds": row} for row in others)))
     assert scene.coupling[0].equals is not None
-    assert coordinate(scene, scene.coupling[0].names[1]) == (2, "u", 2)
+    assert resolve_coordinate(scene, scene.coupling[0].names[1]) == (2, "u", 2)
 
 
 @pytest.mark.parametrize(

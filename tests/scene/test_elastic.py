@@ -101,7 +101,9 @@ def test_every_key_reads_and_writes(tmp_path: Path) -> None:
     assert Scene(**tomllib.loads(scene.to_toml())) == scene
     assert Scene(**scene.model_dump()) == scene
     json.dumps(Scene.model_json_schema())
-    assert [scene.skeleton.bodies[i].name for i in topology.build(scene.skeleton).order] == ["link"]
+    assert [
+        scene.skeleton.bodies[i].name for i in topology.build_topology(scene.skeleton).order
+    ] == ["link"]
 
 
 def test_paths_start_from_the_folder_of_the_scene_file(

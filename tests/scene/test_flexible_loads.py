@@ -9,7 +9,7 @@ import pytest
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.numbers.rotations import from_quaternion, from_rpy
+from mstmm.numerics.rotations import from_quaternion, from_rpy
 from mstmm.scene import Scene
 from scene.scenes import Data, bladed
 

@@ -9,7 +9,7 @@ import pytest
 from mstmm.errors import SceneError
 from mstmm.scene import Scene, load_scene
 from mstmm.scene.checks import topology
-from mstmm.scene.checks.closures import rows_of
+from mstmm.scene.checks.loop_closures import row_count_if_cut
 from mstmm.scene.checks.topology import Topology
 from scene.scenes import Data, arm, beam, body, hinge
 
@@ -37,7 +37,7 @@ def four_bar(**changes: Any) -> Data:
 
 def tree_of(data: Data) -> tuple[Scene, Topology]:
     scene = Scene(**data)
-    return scene, topology.build(scene)
+    return scene, topology.build_topology(scene)
 
 
 def cut_of(data: Data) -> list[str]:
@@ -73,7 +73,7 @@ def test_drives_and_rotor_inertia_are_rows_of_a_cut_hinge() -> None:
         "slider": ({"type": "cylindrical", "drive": ["free", "t"]}, 5),
     }  # fmt: skip
     for changes, expected in rows.values():
-        assert rows_of(Scene(**four_bar(tip=changes)).hinge[2]) == expected
+        assert row_count_if_cut(Scene(**four_bar(tip=changes)).hinge[2]) == expected
 
 
 def test_members_of_a_chain_may_carry_what_closes_a_loop() -> None:

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from mstmm import load_scene
 from mstmm.errors import SceneError
-from mstmm.numbers.pieces import rough, steady, through
+from mstmm.numerics.piecewise_polynomial import constant, discontinuities, interpolate
 from mstmm.scene import Scene, Signal
 from scene.scenes import Data, body, hinge
 
@@ -43,13 +43,13 @@ def refused(data: Data) -> str:
 @pytest.mark.parametrize("count", [2, 3, 4, 5])
 def test_a_cubic_signal_is_the_spline_that_is_not_a_knot_at_its_ends(count: int) -> None:
     times, values = TIMES[:count], VALUES[:count]
-    found, spline = through(times, values, "cubic"), CubicSpline(times, values)
+    found, spline = interpolate(times, values, "cubic"), CubicSpline(times, values)
     at = np.linspace(times[0], times[-1], 101)
     np.testing.assert_allclose([found.value(t) for t in at], spline(at), rtol=0, atol=1e-14)
 
 
 def test_lines_and_steps_go_through_their_values() -> None:
-    line, hold = through(TIMES, VALUES, "line"), through(TIMES, VALUES, "hold")
+    line, hold = interpolate(TIMES, VALUES, "line"), interpolate(TIMES, VALUES, "hold")
     at = np.linspace(-1.0, 4.0, 301)
     expected = np.interp(at, TIMES, VALUES)
     np.testing.assert_allclose([line.value(t) for t in at], expected, rtol=0, atol=1e-15)
@@ -60,29 +60,32 @@ def test_lines_and_steps_go_through_their_values() -> None:
 
 @pytest.mark.parametrize("interpolation", ["hold", "line", "cubic"])
 def test_a_signal_stands_still_outside_its_times(interpolation: str) -> None:
-    found = through(TIMES, VALUES, interpolation)
+    found = interpolate(TIMES, VALUES, interpolation)
     assert [found.value(t) for t in (-5.0, 0.0)] == [VALUES[0]] * 2
     assert [found.value(t) for t in (2.6, 50.0)] == [VALUES[-1]] * 2
     assert found.at(50.0)[2:] == (0.0, 0.0, 0.0)
 
 
 def test_a_line_has_not_stopped_at_its_last_time() -> None:
-    found = through(TIMES, VALUES, "line")
+    found = interpolate(TIMES, VALUES, "line")
     assert found.at(2.5)[2] == pytest.approx(-0.25 / 1.2)
     assert found.value(2.5) == pytest.approx(0.25, abs=1e-15)
 
 
 def test_jumps_are_found_among_the_knots() -> None:
-    assert rough(through(TIMES, VALUES, "cubic"))[0] == 0.0
-    assert len(rough(through(TIMES, VALUES, "cubic"))) == 2
-    assert rough(through((0, 1, 2, 3), (0, 1, 2, 4), "line"))[1:] == [2.0, math.nextafter(3.0, 4)]
-    assert rough(through(TIMES, VALUES, "hold")) == list(TIMES[1:])
+    assert discontinuities(interpolate(TIMES, VALUES, "cubic"))[0] == 0.0
+    assert len(discontinuities(interpolate(TIMES, VALUES, "cubic"))) == 2
+    assert discontinuities(interpolate((0, 1, 2, 3), (0, 1, 2, 4), "line"))[1:] == [
+        2.0,
+        math.nextafter(3.0, 4),
+    ]
+    assert discontinuities(interpolate(TIMES, VALUES, "hold")) == list(TIMES[1:])
 
 
 def test_rates_of_an_input_are_those_of_its_start() -> None:
-    found = steady(1.0, 2.0, 6.0)
+    found = constant(1.0, 2.0, 6.0)
     assert [found.value(t) for t in (0.0, 1.0, 2.0)] == [1.0, 6.0, 17.0]
-    assert not found.varies and not found.stands and steady(1.0).stands
+    assert not found.varies and not found.stands and constant(1.0).stands
 
 
 # --- files ----------------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ def test_depth_first_branch_by_branch_in_scene_order() -> None:
         "h2": ("a.tip", "c"),
     }
     scene = Scene(**scene_of(edges, ["e", "c", "d", "b", "a"]))
-    tree = topology.build(scene)
+    tree = topology.build_topology(scene)
     names = [scene.body[link.body].name for link in tree.links]
     assert names == ["e", "b", "d", "a", "c"]
     assert tree.parents == (-1, -1, 1, 1, 3)
@@ -48,7 +48,7 @@ def test_depth_first_branch_by_branch_in_scene_order() -> None:
 
 
 def test_chain() -> None:
-    tree = topology.build(Scene(**scene_of({"h1": ("ground", "a"), "h2": ("a.tip", "b")})))
+    tree = topology.build_topology(Scene(**scene_of({"h1": ("ground", "a"), "h2": ("a.tip", "b")})))
     assert tree.parents == (-1, 0)
 
 
@@ -71,7 +71,7 @@ def random_tree(n: int, seed: int) -> Data:
 @pytest.mark.parametrize("seed", range(5))
 def test_random_trees_against_the_definition(seed: int) -> None:
     scene = Scene(**random_tree(60, seed))
-    links = topology.build(scene).links
+    links = topology.build_topology(scene).links
     assert sorted(link.body for link in links) == list(range(60))
     for place, link in enumerate(links):
         joint = scene.hinge[link.hinge]
@@ -127,7 +127,7 @@ def test_a_turned_hinge_becomes_a_tree_when_swapped_as_the_message_says() -> Non
     swapped = {"h1": ("ground", "a"), "h2": ("a.tip", "c"), "h3": ("c", "b")}
     with pytest.raises(SceneError):
         Scene(**scene_of(edges))
-    assert is_chain(topology.build(Scene(**scene_of(swapped))))
+    assert is_chain(topology.build_topology(Scene(**scene_of(swapped))))
 
 
 def test_no_hinge_at_all() -> None:
@@ -139,7 +139,7 @@ def test_no_hinge_at_all() -> None:
 def test_a_copy_that_lost_its_hinges_is_refused_too() -> None:
     scene = Scene(**scene_of({"h1": ("ground", "a"), "h2": ("a.tip", "b")}))
     with pytest.raises(SceneError, match=r'^scene: body "b": no hinge connects it'):
-        topology.build(scene.model_copy(update={"hinge": scene.hinge[:1]}))
+        topology.build_topology(scene.model_copy(update={"hinge": scene.hinge[:1]}))
 
 
 def test_twenty_thousand_bodies_take_no_stack() -> None:
@@ -150,5 +150,7 @@ def test_twenty_thousand_bodies_take_no_stack() -> None:
         Hinge.model_construct(name=f"h{i}", type="pin", inboard=held[i], outboard=f"b{i}")
         for i in range(n)
     )
-    tree = topology.build(Scene.model_construct(gravity=(0, 0, 0), body=bodies, hinge=hinges))
+    tree = topology.build_topology(
+        Scene.model_construct(gravity=(0, 0, 0), body=bodies, hinge=hinges)
+    )
     assert is_chain(tree) and len(tree.links) == n

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from mstmm.errors import SceneError
-from mstmm.ir.spec import ElementSpec, Param
+from mstmm.ir.element_spec import ElementSpec, Param
 from mstmm.scene import Scene, load_scene
 from scene.scenes import arm, body, changed, hinge, one
 

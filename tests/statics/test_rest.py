@@ -7,7 +7,12 @@ import pytest
 from numpy.typing import NDArray
 
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.statics.rest import Rest, Undetermined, Unsettled, at_rest
+from mstmm.runtime.engine.statics.rest import (
+    Rest,
+    Undetermined,
+    Unsettled,
+    find_determined_equilibrium,
+)
 
 Array = NDArray[np.float64]
 
@@ -24,7 +29,7 @@ def spiral(q: Array) -> Array:
 
 
 def test_a_load_that_is_too_much_at_once_is_applied_in_parts() -> None:
-    found = at_rest(Rest(spiral, moved, np.ones(2)), np.zeros(2), 1e-10)
+    found = find_determined_equilibrium(Rest(spiral, moved, np.ones(2)), np.zeros(2), 1e-10)
     assert np.abs(spiral(found)).max() < 1e-12
 
 
@@ -37,7 +42,7 @@ def test_units_do_not_matter() -> None:
         x = q / units
         return np.asarray((stiffness @ (x + x**3) - [1.0, 2.0]) / units)
 
-    found = at_rest(Rest(needed, moved, units), np.zeros(2), 1e-10)
+    found = find_determined_equilibrium(Rest(needed, moved, units), np.zeros(2), 1e-10)
     assert np.abs(needed(found) * units).max() < 1e-12
 
 
@@ -47,7 +52,7 @@ def test_a_state_that_does_not_exist_is_not_stepped_into() -> None:
             raise NumericalFailure("beyond the end")
         return np.array([np.tan(3.9 * q[0]) - 8.0])
 
-    found = at_rest(Rest(needed, moved, np.ones(1)), np.zeros(1), 1e-10)
+    found = find_determined_equilibrium(Rest(needed, moved, np.ones(1)), np.zeros(1), 1e-10)
     assert found[0] == pytest.approx(np.arctan(8.0) / 3.9, abs=1e-10)
 
 
@@ -60,14 +65,18 @@ def test_a_stiffness_of_rounding_is_undetermined_and_a_small_one_is_not() -> Non
         return np.array([1e3 * turned + 1e-2 * q[0], 1e3 * turned, loose])
 
     with pytest.raises(Undetermined) as caught:
-        at_rest(Rest(needed, moved, np.ones(3)), np.array([0.1, 0.2, 0.0]), 1e-8)
+        find_determined_equilibrium(
+            Rest(needed, moved, np.ones(3)), np.array([0.1, 0.2, 0.0]), 1e-8
+        )
     assert caught.value.places == (2,)
 
 
 @pytest.mark.parametrize("value", [1.0, np.nan])
 def test_efforts_that_nothing_balances_are_left(value: float) -> None:
     with pytest.raises((Unsettled, NumericalFailure)):
-        at_rest(Rest(lambda _: np.array([value]), moved, np.ones(1)), np.zeros(1), 1e-10)
+        find_determined_equilibrium(
+            Rest(lambda _: np.array([value]), moved, np.ones(1)), np.zeros(1), 1e-10
+        )
 
 
 def test_a_slack_valley_is_followed_to_its_bottom() -> None:
@@ -81,6 +90,8 @@ def test_a_slack_valley_is_followed_to_its_bottom() -> None:
         force = 1e-8 * along + 3 * along**3
         return np.array([across + force, across - force])
 
-    found = at_rest(Rest(needed, moved, np.ones(2)), np.array([2e-4, 1e-4]), 1e-10)
+    found = find_determined_equilibrium(
+        Rest(needed, moved, np.ones(2)), np.array([2e-4, 1e-4]), 1e-10
+    )
     assert np.abs(found).max() < 1e-9
     assert len(calls) < 150

@@ -11,7 +11,7 @@ from scipy.optimize import root
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.tangent import Tangent
+from mstmm.runtime.engine.tangent_matrix import TangentMatrix
 
 LENGTH, MASS, GRAVITY = 0.1, 0.2, 9.81
 
@@ -80,7 +80,7 @@ def test_rest_that_does_not_last_is_left_or_told() -> None:
 def test_a_pivot_changes_sign_where_an_inverse_step_meets_what_topples(count: int) -> None:
     """Z = K + s^2 M is singular where s is the growth rate of an inverted chain."""
     model = mstmm.compile(mstmm.Scene(**chain(count)), engine="looped")
-    tangent, still = Tangent(model.looped), np.zeros(count)
+    tangent, still = TangentMatrix(model.looped), np.zeros(count)
     upright = np.zeros(count)
     upright[0] = -np.pi / 2
     tangent.residual(0.0, upright, still, still)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.bodies import modal_bodies
+from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.runtime.result.flexible.motion import Motion
 

@@ -14,9 +14,9 @@ from typing import Any
 import cffi
 
 import mstmm.runtime.engine
-from mstmm.border import elements as abi
-from mstmm.derive.print.render import write_generated
-from mstmm.ir.spec import ElementSpec
+from mstmm.abi import element_library as abi
+from mstmm.derive.codegen.template_rendering import write_generated
+from mstmm.ir.element_spec import ElementSpec
 from mstmm.ir.tape import INSTRUCTION_WIDTH, OUTPUT_WIDTH, Tape
 
 #: C of the looped engine.

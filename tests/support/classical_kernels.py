@@ -9,12 +9,12 @@ import mpmath
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.classical.catalogue import classical_guards
-from mstmm.derive.language.derivation import Derivation
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.definition.derivation import Derivation
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR
-from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.interpreter import evaluate_floats
 from support.dense_chain import Array, Body
 
 #: Index of the planar state in the spatial one: x, y, theta, m_z, q_x, q_y, 1.

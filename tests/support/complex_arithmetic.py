@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from mstmm.ir import OPERATIONS, Constant, KernelIR
-from mstmm.ir.replay import run
+from mstmm.ir.interpreter import replay_kernel
 
 STEP = 1e-200
 
@@ -38,7 +38,7 @@ def _power(a: complex, b: complex) -> complex:
 
 
 class ComplexArithmetic:
-    """What `mstmm.derive.audit.evaluate.run` needs."""
+    """What `mstmm.derive.verification.kernel_evaluation.replay_kernel` needs."""
 
     operations: ClassVar[Mapping[str, Callable[..., Any]]] = {
         **{name: getattr(cmath, name) for name in (
@@ -80,5 +80,5 @@ def complex_step(
         ]
         for name, values in inputs.items()
     }
-    found = run(kernel, moved, ComplexArithmetic(), None)
+    found = replay_kernel(kernel, moved, ComplexArithmetic(), None)
     return {name: [y.imag / STEP for y in row] for name, row in found.items()}

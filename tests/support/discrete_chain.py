@@ -14,9 +14,9 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.classical.catalogue import CLASSICAL
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR
 from support.discrete_bodies import (
     DIGITS,

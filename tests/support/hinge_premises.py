@@ -7,11 +7,11 @@ from typing import Any
 import mpmath
 import numpy as np
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.classical.discrete.hinge import Pairing
 from mstmm.derive.classical.discrete.state import Space
-from mstmm.derive.classical.state import State
-from mstmm.derive.language.derivation import Derivation
+from mstmm.derive.classical.state_vector import StateVector
+from mstmm.derive.definition.derivation import Derivation
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR
 from support.discrete_bodies import DIGITS, Array, ParticleBody, drawn, kernel_inputs, stacked
 from support.premises import Premises
@@ -30,7 +30,7 @@ def matrices(ir: KernelIR, inputs: dict[str, list[Any]]) -> Values:
     return found
 
 
-def blocks(state: State, values: Array, end: str) -> Values:
+def blocks(state: StateVector, values: Array, end: str) -> Values:
     """Blocks of a state vector by name, such as r_I."""
     found, first = {}, 0
     for name, size in zip(state.names, state.sizes, strict=True):
@@ -39,7 +39,7 @@ def blocks(state: State, values: Array, end: str) -> Values:
     return found
 
 
-def drawn_state(rng: np.random.Generator, state: State) -> Array:
+def drawn_state(rng: np.random.Generator, state: StateVector) -> Array:
     """A state vector, 1 last."""
     values = drawn(rng, state.length)
     values[state.length - 1] = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import mstmm
-from mstmm.runtime.pack.merge.simplification import Simplification
+from mstmm.runtime.packing.merging.simplification import Simplification
 from mstmm.runtime.result.result import Result
 
 

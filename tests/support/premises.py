@@ -10,8 +10,8 @@ import mpmath
 import sympy as sp
 from sympy.matrices.expressions.matexpr import MatrixElement
 
-from mstmm.derive.language.derivation import Derivation, Equation
-from mstmm.derive.language.notation import Perp, Tilde
+from mstmm.derive.definition.derivation import Derivation, Equation
+from mstmm.derive.definition.notation import Perp, Tilde
 
 DIGITS = 80
 #: Step of the differences; their error is its square.

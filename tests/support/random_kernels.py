@@ -6,8 +6,8 @@ import random
 from collections.abc import Sequence
 
 from mstmm.ir import OPERATIONS, KernelIR, Port
+from mstmm.ir.element_spec import ElementSpec, Param
 from mstmm.ir.graph import Graph, Node
-from mstmm.ir.spec import ElementSpec, Param
 
 INPUTS = (Port("x", (4,)), Port("A", (2, 3)))
 

@@ -11,7 +11,7 @@ from typing import Any
 import cffi
 import numpy as np
 
-from mstmm.derive.print.scalar_function import scalar_source
+from mstmm.derive.codegen.scalar_function import scalar_source
 from mstmm.ir import KernelIR
 
 Exact = list[Fraction]
@@ -27,7 +27,8 @@ int scalar_motion(const double *const *inputs, double t_end, int steps, int colu
 
 
 class ScalarKernel:
-    """One kernel in a type of `mstmm.derive.print.scalar_function`; outputs are exact fractions."""
+    """One kernel in a type of `mstmm.derive.codegen.scalar_function`; outputs are exact
+    fractions."""
 
     def __init__(self, kernel: KernelIR, scalar: str, folder: Path) -> None:
         self.kernel = kernel

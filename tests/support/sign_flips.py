@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
-from mstmm.derive.language.derivation import Equation
-from mstmm.derive.language.notation import residual
+from mstmm.derive.definition.derivation import Equation
+from mstmm.derive.definition.notation import residual
 
 Flip = tuple[int, str, int]
 

@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.classical.discrete import body as flexible_body
-from mstmm.derive.classical.discrete import joint as flexible_joint
+from mstmm.derive.classical.discrete import rigid_hinges as flexible_joint
+from mstmm.derive.classical.discrete.body_options import BodyStatement
 from mstmm.derive.classical.discrete.hinge import Pairing
 from mstmm.derive.classical.discrete.state import PLANE
-from mstmm.derive.classical.discrete.statement import BodyStatement
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR
-from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.interpreter import evaluate_floats
 
 Array = NDArray[np.float64]
 TURN = 0.3
@@ -72,7 +72,7 @@ def body_kernel(modes: int) -> KernelIR:
 def weld_kernel(inboard: int, outboard: int) -> KernelIR:
     """The fixed hinge between bodies with any numbers of modes."""
     return lower(
-        flexible_joint.fixed(Pairing(PLANE, inboard, outboard), "weld", "", ""), "transfer"
+        flexible_joint.fixed_hinge(Pairing(PLANE, inboard, outboard), "weld", "", ""), "transfer"
     )
 
 

@@ -1,5 +1,5 @@
 """Functions that switch branches: what is lawful agrees and runs, what is not is refused by both
-`check` and `generate`."""
+`check_element` and `generate`."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import sympy as sp
 from scipy.integrate import solve_ivp
 
 import mstmm
-from mstmm.bridge.crosscheck import crosscheck_definition
 from mstmm.derive import ForceElement, Hinge, Param, rotation_about
-from mstmm.derive.audit.definition import check
-from mstmm.derive.language.switches import slope
+from mstmm.derive.definition.nonsmooth_functions import slope
+from mstmm.derive.verification.definition_checks import check_element
 from mstmm.errors import ElementError
+from mstmm.pipeline.crosscheck import crosscheck_definition
 
 a, r = sp.symbols("q_angle p_r", real=True)
 LIFTS = {
@@ -90,7 +90,7 @@ class Root(ForceElement):
 @pytest.mark.parametrize("name", LIFTS)
 def test_branches_that_meet_agree(name: str) -> None:
     element = cam(name, LIFTS[name])
-    check(element)
+    check_element(element)
     assert crosscheck_definition(element, points=1).passed
 
 
@@ -98,14 +98,14 @@ def test_branches_that_meet_agree(name: str) -> None:
 def test_an_impulse_is_refused(name: str) -> None:
     height, message = JUMPS[name]
     with pytest.raises(ElementError, match=message):
-        check(cam(name, height))
+        check_element(cam(name, height))
 
 
 def test_forces_may_kink_and_energies_may_not_jump() -> None:
-    check(Floor())
+    check_element(Floor())
     assert crosscheck_definition(Floor()).passed
     with pytest.raises(ElementError, match=r"potential\(x, p\) jumps at x_3 = -1.0, where floor"):
-        check(Broken())
+        check_element(Broken())
 
 
 def test_numbers_without_a_value_are_told_by_their_names() -> None:

@@ -13,26 +13,26 @@ from PIL import Image, ImageSequence
 from view import scenes
 
 from mstmm.errors import EnvironmentFailure
-from mstmm.runtime.result.view.drawn import Flat
-from mstmm.runtime.result.view.film import _columns
-from mstmm.runtime.result.view.staging import staged
-from mstmm.runtime.result.view.view import View
+from mstmm.runtime.result.scene3d.image_export import _column_count
+from mstmm.runtime.result.scene3d.projection import ProjectedFrame
+from mstmm.runtime.result.scene3d.scene_builder import build_scene_graph
+from mstmm.runtime.result.scene3d.view import SceneView
 
 
 @pytest.fixture(scope="module")
-def view() -> View:
-    return View("", [("", staged(scenes.run(), "a beam and a rod", speed=20.0))])
+def view() -> SceneView:
+    return SceneView("", [("", build_scene_graph(scenes.run(), "a beam and a rod", speed=20.0))])
 
 
 @pytest.mark.parametrize("shape", [0.3, 0.7, 1.5])
 def test_rows_of_a_strip_are_alike(shape: float) -> None:
     for count in range(1, 13):
-        columns = _columns(count, shape)
+        columns = _column_count(count, shape)
         rows = math.ceil(count / columns)
         assert rows * columns - count < rows
 
 
-def test_a_strip(view: View, tmp_path: Path) -> None:
+def test_a_strip(view: SceneView, tmp_path: Path) -> None:
     view.save(tmp_path / "strip.png", moments=3)
     picture = np.asarray(Image.open(tmp_path / "strip.png").convert("RGB"))
     thirds = np.array_split(picture, 3, axis=1)
@@ -41,7 +41,7 @@ def test_a_strip(view: View, tmp_path: Path) -> None:
     assert not np.array_equal(thirds[0][:, : thirds[2].shape[1]], thirds[2])
 
 
-def test_a_gif_has_every_moment(view: View, tmp_path: Path) -> None:
+def test_a_gif_has_every_moment(view: SceneView, tmp_path: Path) -> None:
     view.save(tmp_path / "film.gif")
     rate = (len(view.stage.times) - 1) * 20.0 / 2.0
     with Image.open(tmp_path / "film.gif") as film:
@@ -50,7 +50,7 @@ def test_a_gif_has_every_moment(view: View, tmp_path: Path) -> None:
         assert film.info["duration"] == pytest.approx(1000 / 15, abs=10)
 
 
-def test_frames(view: View, tmp_path: Path) -> None:
+def test_frames(view: SceneView, tmp_path: Path) -> None:
     view.save(tmp_path / "frames")
     made = sorted((tmp_path / "frames").iterdir())
     assert [path.name for path in made] == [
@@ -59,7 +59,7 @@ def test_frames(view: View, tmp_path: Path) -> None:
 
 
 def test_an_mp4_without_its_program(
-    view: View, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    view: SceneView, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
@@ -67,20 +67,20 @@ def test_an_mp4_without_its_program(
         view.save(tmp_path / "film.mp4")
 
 
-def test_an_mp4(view: View, tmp_path: Path) -> None:
+def test_an_mp4(view: SceneView, tmp_path: Path) -> None:
     view.save(tmp_path / "film.mp4")
     assert (tmp_path / "film.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-def test_what_is_near_hides_what_is_far(view: View) -> None:
-    corners, colours = Flat(view.stage)._triangles(0)
-    low, high = Flat(view.stage).window
+def test_what_is_near_hides_what_is_far(view: SceneView) -> None:
+    corners, colours = ProjectedFrame(view.stage)._triangles(0)
+    low, high = ProjectedFrame(view.stage).window
     assert len(corners) == len(colours) > 100
     assert (corners >= low - 1e-9).all()
     assert (corners <= high + 1e-9).all()
 
 
-def test_endings_of_any_case_and_nobody_else_s_settings(view: View, tmp_path: Path) -> None:
+def test_endings_of_any_case_and_nobody_else_s_settings(view: SceneView, tmp_path: Path) -> None:
     import matplotlib as mpl
 
     before = dict(mpl.rcParams)
@@ -91,7 +91,7 @@ def test_endings_of_any_case_and_nobody_else_s_settings(view: View, tmp_path: Pa
 
 @pytest.mark.parametrize("name", ["film.gif", "strip.png", "frames"])
 def test_without_the_extra_it_is_named(
-    view: View, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    view: SceneView, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for module in [*(m for m in sys.modules if m.startswith("matplotlib")), "matplotlib"]:
         monkeypatch.setitem(sys.modules, module, None)

@@ -12,7 +12,7 @@ from view import browser, scenes
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.linear.motions import Modes
+from mstmm.runtime.linear.modes import Modes
 
 #: A parallel crank on springs: two cranks of 1 m and a bar between them.
 CRANKS: dict[str, Any] = {

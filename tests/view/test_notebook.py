@@ -16,7 +16,7 @@ from view import scenes
 import mstmm
 from mstmm.derive.catalogue.registry import builtin_elements
 from mstmm.errors import SceneError
-from mstmm.extras import figures
+from mstmm.optional_packages import figure_class
 
 
 def cells(shown: str) -> list[str]:
@@ -136,7 +136,7 @@ def test_figures_show_themselves_where_a_notebook_runs(monkeypatch: pytest.Monke
         kernel=object(), display_formatter=SimpleNamespace(formatters={"image/png": png})
     )
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
-    figures()
+    figure_class()
     monkeypatch.undo()
     figure = scenes.run().plot("energy")
     assert printers[type(figure)](figure)[:4] == b"\x89PNG"

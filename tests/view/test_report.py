@@ -13,9 +13,9 @@ from view import browser, scenes
 from view.blocks import blocks, near
 
 import mstmm
-from mstmm import markup
-from mstmm.bridge.reporting import words
+from mstmm import notebook_html
 from mstmm.errors import SceneError
+from mstmm.pipeline.report import summary_tables
 
 #: Nothing may be fetched: the page names no other place but in what readers may follow themselves.
 _FETCHED = ("<link", '<img src="http', "<script src", "@import")
@@ -85,7 +85,7 @@ def test_it_tells_how_many_digits_hold_until_when() -> None:
     assert error is not None
     share = error.largest("q")["rad"] / np.ptp(run.q[:, 0])
     said = r"Up to t = 2 s a second.* by at most (\S+) rad, which is (\d+) digits of"
-    found = re.search(said, words.verdict(run))
+    found = re.search(said, summary_tables.verdict_html(run))
     assert found is not None
     assert float(found[1]) == pytest.approx(error.largest("q")["rad"], rel=0.05)
     assert 10.0 ** -(int(found[2]) + 1) < share <= 10.0 ** -int(found[2])
@@ -99,8 +99,10 @@ def test_refusals(tmp_path: Path) -> None:
 
 
 def test_everything_is_escaped() -> None:
-    made = markup.table([("<script>", "a & b")], ("<i>",)) + markup.bullets(["</ul><b>"])
-    made += markup.folded("<x>", "")
+    made = notebook_html.table([("<script>", "a & b")], ("<i>",)) + notebook_html.bullets(
+        ["</ul><b>"]
+    )
+    made += notebook_html.collapsible("<x>", "")
     assert "<script>" not in made
     assert "<i>" not in made
     assert "<b>" not in made

@@ -13,10 +13,10 @@ from view import scenes
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.model.loading import load_netcdf
-from mstmm.runtime.result.record import Record
+from mstmm.runtime.model.result_loading import load_netcdf
 from mstmm.runtime.result.result import Result
-from mstmm.runtime.result.view.staging import staged
+from mstmm.runtime.result.result_record import Record
+from mstmm.runtime.result.scene3d.scene_builder import build_scene_graph
 
 TETRAHEDRON = """\
 v 0 0 0
@@ -72,7 +72,7 @@ def test_meshes(tmp_path: Path) -> None:
     file = str(tmp_path / "hub.obj")
     shape = {"on": "hub", "type": "mesh", "file": file, "scale": 0.01, "position": [0, 0, 1]}
     run = mstmm.compile(with_shape(**shape), engine="looped").simulate(0.0)
-    [mesh] = [s for s in staged(run, "mesh").solids if s.part == "shape1"]
+    [mesh] = [s for s in build_scene_graph(run, "mesh").solids if s.part == "shape1"]
     assert len(mesh.surface.faces) == 4
     assert mesh.surface.vertices.max(axis=0) == pytest.approx([0.1, 0.2, 1.3])
 
@@ -95,9 +95,9 @@ def test_meshes_go_with_a_result(tmp_path: Path, sent: Callable[[Result, Path], 
     file.write_text(TETRAHEDRON)
     scene = with_shape(on="hub", type="mesh", file=str(file))
     run = mstmm.compile(scene, engine="looped").simulate(0.0)
-    before, there = staged(run, "mesh").solids, sent(run, tmp_path)
+    before, there = build_scene_graph(run, "mesh").solids, sent(run, tmp_path)
     file.unlink()
-    for was, solid in zip(before, staged(there, "mesh").solids, strict=True):
+    for was, solid in zip(before, build_scene_graph(there, "mesh").solids, strict=True):
         assert np.array_equal(solid.surface.vertices, was.surface.vertices)
         assert np.array_equal(solid.surface.faces, was.surface.faces)
 
@@ -110,7 +110,7 @@ def test_meshes_that_are_none(tmp_path: Path, text: str | None) -> None:
     scene = with_shape(on="hub", type="mesh", file=str(path))
     run = mstmm.compile(scene, engine="looped").simulate(0.0)
     with pytest.raises(SceneError, match='shape "shape1": file'):
-        staged(run, "mesh")
+        build_scene_graph(run, "mesh")
 
 
 @pytest.mark.parametrize("how", ["above", "absolute", "link", "missing"])

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mstmm.runtime.result.view import solids
-from mstmm.runtime.result.view.solids import Surface
+from mstmm.runtime.result.scene3d import solid_meshes
+from mstmm.runtime.result.scene3d.solid_meshes import Surface
 
 
 def volume(surface: Surface) -> float:
@@ -30,17 +30,21 @@ def ball(around: int) -> float:
 
 
 def test_volumes() -> None:
-    n = solids.ROUND
-    assert volume(solids.box((1.0, 2.0, 3.0))) == pytest.approx(6.0, rel=1e-14)
-    assert volume(solids.cylinder(0.5, 2.0)) == pytest.approx(polygon(n) / 2, rel=1e-14)
-    assert volume(solids.ellipsoid((1.0, 2.0, 3.0))) == pytest.approx(6 * ball(n), rel=1e-13)
+    n = solid_meshes.CORNERS_AROUND
+    assert volume(solid_meshes.box_surface((1.0, 2.0, 3.0))) == pytest.approx(6.0, rel=1e-14)
+    assert volume(solid_meshes.cylinder_surface(0.5, 2.0)) == pytest.approx(
+        polygon(n) / 2, rel=1e-14
+    )
+    assert volume(solid_meshes.ellipsoid_surface((1.0, 2.0, 3.0))) == pytest.approx(
+        6 * ball(n), rel=1e-13
+    )
     capsule = 0.25 * polygon(n) * 2.0 + 0.125 * ball(n)
-    assert volume(solids.capsule(0.5, 2.0)) == pytest.approx(capsule, rel=1e-13)
+    assert volume(solid_meshes.capsule_surface(0.5, 2.0)) == pytest.approx(capsule, rel=1e-13)
 
 
 def test_a_bar_goes_from_point_to_point() -> None:
     start, end = np.array([1.0, -2.0, 0.5]), np.array([-1.0, 1.0, 2.0])
-    bar = solids.bar(start, end, 0.1, 12)
+    bar = solid_meshes.bar_surface(start, end, 0.1, 12)
     long = np.linalg.norm(end - start)
     assert volume(bar) == pytest.approx(0.01 * polygon(12) * long, rel=1e-13)
     places = (bar.vertices - start) @ (end - start) / long
@@ -50,12 +54,17 @@ def test_a_bar_goes_from_point_to_point() -> None:
 
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (1, -2, 3)])
 def test_axes_along_a_direction(direction: tuple[int, int, int]) -> None:
-    axes = solids.along(direction)
+    axes = solid_meshes.axes_along(direction)
     assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-15)
     assert np.linalg.det(axes) == pytest.approx(1.0)
     assert axes[:, 2] == pytest.approx(np.array(direction) / np.linalg.norm(direction))
 
 
 def test_joined_surfaces_keep_their_volumes() -> None:
-    both = solids.joined([solids.box((1, 1, 1)), solids.cylinder(1.0, 1.0).placed((5, 0, 0))])
-    assert volume(both) == pytest.approx(1.0 + polygon(solids.ROUND), rel=1e-13)
+    both = solid_meshes.join_surfaces(
+        [
+            solid_meshes.box_surface((1, 1, 1)),
+            solid_meshes.cylinder_surface(1.0, 1.0).placed((5, 0, 0)),
+        ]
+    )
+    assert volume(both) == pytest.approx(1.0 + polygon(solid_meshes.CORNERS_AROUND), rel=1e-13)

@@ -10,17 +10,17 @@ from view import scenes
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
-from mstmm.runtime.flexible.elastic.bodies import model_of
-from mstmm.runtime.flexible.elastic.skin import MOST, skin
-from mstmm.runtime.result.view import bodies
-from mstmm.runtime.result.view.camera import FIELD, camera
-from mstmm.runtime.result.view.moments import natural_speed
-from mstmm.runtime.result.view.staging import staged
+from mstmm.runtime.flexible.elastic.modal_elastic import model_of
+from mstmm.runtime.flexible.elastic.surface_mesh import MOST, skin
+from mstmm.runtime.result.scene3d import body_geometry
+from mstmm.runtime.result.scene3d.camera import FIELD_OF_VIEW, choose_camera
+from mstmm.runtime.result.scene3d.frame_times import natural_speed
+from mstmm.runtime.result.scene3d.scene_builder import build_scene_graph
 
 
 def test_poses_between_samples_are_those_of_a_run_with_more() -> None:
     run = scenes.run()
-    stage = staged(run, "between", speed=0.9)
+    stage = build_scene_graph(run, "between", speed=0.9)
     assert len(stage.times) == 68
     fine = scenes.model().simulate(2.0, output_times=stage.times)
     pose = stage.poses["bodies/rod"]
@@ -31,7 +31,7 @@ def test_poses_between_samples_are_those_of_a_run_with_more() -> None:
 
 def test_a_tube_ends_where_the_beam_does() -> None:
     run = scenes.run()
-    stage = staged(run, "tube", most=21)
+    stage = build_scene_graph(run, "tube", most=21)
     [tube] = stage.bent
     around = 8
     tip = tube.vertices[:, -around:].mean(axis=1)
@@ -42,7 +42,7 @@ def test_a_tube_ends_where_the_beam_does() -> None:
 
 def test_springs_and_trails_meet_their_ends() -> None:
     run = scenes.run()
-    stage = staged(run, "lines", trails=("rod.tip",), most=11)
+    stage = build_scene_graph(run, "lines", trails=("rod.tip",), most=11)
     coil, trail = stage.lines
     fine = scenes.model().simulate(2.0, output_times=stage.times)
     assert coil.points[:, 0] == pytest.approx(np.tile([0.0, 0.0, 1.0], (11, 1)), abs=1e-12)
@@ -52,7 +52,7 @@ def test_springs_and_trails_meet_their_ends() -> None:
 
 
 def test_bodies_with_shapes_are_drawn_by_them_alone() -> None:
-    stage = staged(scenes.run(), "shapes", most=2)
+    stage = build_scene_graph(scenes.run(), "shapes", most=2)
     hub = [solid for solid in stage.solids if solid.owner == "bodies/hub"]
     assert [solid.part for solid in hub] == ["case"]
     assert hub[0].colour == (0xAA, 0x33, 0x22)
@@ -69,7 +69,7 @@ def test_the_box_of_equal_inertia_has_that_inertia() -> None:
         mass / 12 * (a * a + b * b),
     ]
     body = mstmm.scene.Body(name="block", mass=mass, inertia=inertia, center_of_mass=[1, 0, 0])
-    block = bodies.equal_inertia(body, 1.0)
+    block = body_geometry.equal_inertia_box(body, 1.0)
     assert block is not None
     edges = np.ptp(block.vertices, axis=0)
     assert edges == pytest.approx([a, b, c])
@@ -77,12 +77,12 @@ def test_the_box_of_equal_inertia_has_that_inertia() -> None:
 
 
 def test_the_camera_sees_everything() -> None:
-    stage = staged(scenes.run(), "seen", most=11)
-    look = camera(stage)
+    stage = build_scene_graph(scenes.run(), "seen", most=11)
+    look = choose_camera(stage)
     seen = (stage.cloud - look.position) @ look.axes.T
     ahead = -seen[:, 2]
     assert (ahead > 0).all()
-    assert (np.abs(seen[:, 1]) <= ahead * np.tan(FIELD / 2)).all()
+    assert (np.abs(seen[:, 1]) <= ahead * np.tan(FIELD_OF_VIEW / 2)).all()
     assert look.axes[1] @ stage.up > 0
 
 
@@ -95,7 +95,7 @@ def test_films_last_some_seconds(lasts: float, speed: float) -> None:
 
 def test_a_start_alone_is_one_moment() -> None:
     still = scenes.model().simulate(0.0)
-    stage = staged(still, "still")
+    stage = build_scene_graph(still, "still")
     assert len(stage.times) == 1
     assert stage.poses["bodies/rod"].position == pytest.approx(still.position("rod")[:1])
 
@@ -103,9 +103,9 @@ def test_a_start_alone_is_one_moment() -> None:
 def test_refusals() -> None:
     run = scenes.run()
     with pytest.raises(SceneError, match=r'"rod\.top": there is no such body or end.*rod\.tip'):
-        staged(run, "x", trails=("rod.top",))
+        build_scene_graph(run, "x", trails=("rod.top",))
     with pytest.raises(SceneError, match="the ground does not move"):
-        staged(run, "x", trails=("ground",))
+        build_scene_graph(run, "x", trails=("ground",))
     for speed in (0.0, -1.0, float("nan")):
         with pytest.raises(SceneError, match="speed"):
             run.view(speed=speed)
@@ -120,11 +120,11 @@ def test_many_bodies_are_seen_with_fewer_pictures() -> None:
              "hinge": [{"type": "pin", "axis": [0, 1, 0]}]}  # fmt: skip
     scene = mstmm.Scene(gravity=[0, 0, -9.81], chain=[chain])
     run = mstmm.compile(scene, engine="looped").simulate(0.2, "dopri5", rtol=1e-3)
-    stage = staged(run, "rope", speed=0.02)
+    stage = build_scene_graph(run, "rope", speed=0.02)
     assert len(stage.times) == 150  # 301 of fewer bodies
     assert not [solid for solid in stage.solids if solid.owner.startswith("hinges/")]
     assert stage.notes == ("more than 300 hinges: they are not drawn",)
-    look = camera(stage)
+    look = choose_camera(stage)
     assert abs(look.axes[2] @ (0, 1, 0)) > 0.9  # almost along the pins
 
 
@@ -137,7 +137,9 @@ def test_a_ball_that_bounces_is_drawn_on_both_sides_of_the_blow() -> None:
                 "axis": [0, 1, 0], "initial": {"q": [2.0]}}],
         event=[{"when": "ball.y <= 0", "do": "bounce", "restitution": 0.8}],
     )  # fmt: skip
-    stage = staged(mstmm.compile(scene, engine="looped").simulate(1.0), "ball", speed=0.1)
+    stage = build_scene_graph(
+        mstmm.compile(scene, engine="looped").simulate(1.0), "ball", speed=0.1
+    )
     blow = np.sqrt(4 / 9.81)
     after = stage.times - blow
     rising = 0.8 * 9.81 * blow * after - 9.81 * after**2 / 2
@@ -158,7 +160,7 @@ def test_an_elastic_body_is_seen_by_its_mesh() -> None:
     )  # fmt: skip
     model = mstmm.compile(scene, engine="looped")
     run = model.simulate(0.2, output_times=[0, 0.1, 0.2])
-    stage = staged(run, "link", most=3)
+    stage = build_scene_graph(run, "link", most=3)
     [seen] = [bent for bent in stage.bent if bent.name == "elastic/link"]
     a, b, c = np.moveaxis(seen.vertices[0][seen.faces], 1, 0)
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(0.5 * 0.04**2)
@@ -195,7 +197,7 @@ def test_many_nodes_are_seen_by_some() -> None:
 
 @pytest.mark.parametrize("size", [1e-3, 1e4])
 def test_pages_of_small_and_large_scenes_are_drawn_at_a_size_that_is_seen(size: float) -> None:
-    stage = staged(scenes.run(), "x", most=3).scaled(size)
+    stage = build_scene_graph(scenes.run(), "x", most=3).scaled(size)
     again = stage.scaled(10.0 / stage.size)
     assert again.size == pytest.approx(10.0)
     pose, other = stage.poses["bodies/rod"], again.poses["bodies/rod"]
@@ -209,7 +211,7 @@ def test_the_rail_of_a_slide_stays_behind() -> None:
         hinge=[{"name": "rail", "type": "prismatic", "inboard": "ground", "outboard": "cart",
                 "axis": [1, 0, 0], "position": [0, 1, 0], "initial": {"u": [1.0]}}],
     )  # fmt: skip
-    stage = staged(mstmm.compile(scene, engine="looped").simulate(2.0), "slide")
+    stage = build_scene_graph(mstmm.compile(scene, engine="looped").simulate(2.0), "slide")
     assert stage.poses["hinges/rail"].position == pytest.approx(np.tile([0.0, 1, 0], (61, 1)))
     assert stage.poses["bodies/cart"].position[-1] == pytest.approx([2, 1, 0])
 

@@ -11,25 +11,25 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ...language.derivation import Derivation, Equation, Quantity, tilde, vector
-from ...language.notation import Matrix
-from .energy import Equations, Motion, equations
-from .moments import ETA, BodyMoments, Letters, planar, spatial
-from .premises import planar_premises, spatial_premises
-from .state import BOOK, Space, perp
-from .statement import TURN, A, BodyStatement, C, inputs_of
-from .transfer import transfer
+from ...definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from ...definition.notation import Matrix
+from .body_options import TANGENT_OPERATOR, A, BodyStatement, C, body_inputs
+from .body_residual import planar_premises, spatial_premises
+from .equations_of_motion import Equations, Motion, equations_of_motion
+from .mass_moments import ETA, BodyMoments, SymbolTable, planar_moments, spatial_moments
+from .state import BOOK, Space, rotate_plane_column
+from .transfer_matrix import transfer_equations
 
 
 def derivation(statement: BodyStatement) -> Derivation:
     """U (z_O = U z_I) and, with modes, W (W z_I = 0) of the body."""
     space, modes = statement.space, statement.modes
-    letters = Letters()
-    build = planar if space.planar else spatial
+    letters = SymbolTable()
+    build = planar_moments if space.planar else spatial_moments
     extra = () if space.planar else (statement.planes,)
     body = build(modes, letters, statement.kind, *extra)
-    motion = _motion(space, modes, letters)
-    solved = equations(body.moments, motion, _elastic(body, motion))
+    motion = _motion_symbols(space, modes, letters)
+    body_equations = equations_of_motion(body.moments, motion, _elastic_forces(body, motion))
     n = space.length(modes)
     outputs = [
         Quantity(sp.MatrixSymbol("U", n, n), space.state(modes).unit, "matrix, z_O = U z_I"),
@@ -39,13 +39,13 @@ def derivation(statement: BodyStatement) -> Derivation:
     return Derivation(
         element=f"classical_{statement.element}",
         title=statement.title,
-        inputs=(*body.inputs, *inputs_of(statement)),
+        inputs=(*body.inputs, *body_inputs(statement)),
         outputs=tuple(outputs),
         definitions=(
-            *_kinematics(space, modes),
+            *_kinematic_equations(space, modes),
             *body.definitions,
-            *_linearised(space, modes, solved, letters),
-            *transfer(statement),
+            *_linearised_equations(space, modes, body_equations, letters),
+            *transfer_equations(statement),
         ),
         premises=(planar_premises if space.planar else spatial_premises)(statement, body),
         sources=(f"{BOOK}, {statement.source}",),
@@ -67,7 +67,7 @@ _NOTES = (
 # --- the residual and its linear form ---------------------------------------------------------
 
 
-def _motion(space: Space, modes: int, letters: Letters) -> Motion:
+def _motion_symbols(space: Space, modes: int, letters: SymbolTable) -> Motion:
     def three(name: str, size: int, before: int) -> sp.Matrix:
         return sp.Matrix(
             [*[0] * before, *letters.of(vector(name, size)), *[0] * (3 - before - size)]
@@ -83,43 +83,47 @@ def _motion(space: Space, modes: int, letters: Letters) -> Motion:
     )  # fmt: skip
 
 
-def _elastic(body: BodyMoments, motion: Motion) -> sp.Matrix:
+def _elastic_forces(body: BodyMoments, motion: Motion) -> sp.Matrix:
     if body.stiffness is None or body.damping is None:
         return sp.zeros(0, 1)
     return body.stiffness * motion.eta + body.damping * motion.etad
 
 
-def _kinematics(space: Space, modes: int) -> tuple[Equation, ...]:
+def _kinematic_equations(space: Space, modes: int) -> tuple[Equation, ...]:
     """Motion at the predictor, in frame axes."""
     rotation = sp.MatrixSymbol("R", space.shifts, space.shifts)
-    lead = [Equation("frame axes at the predictor", rotation, _axes(space))]
+    equations_ = [Equation("frame axes at the predictor", rotation, _frame_axes(space))]
     w, wd = vector("w", space.turns), vector("wd", space.turns)
     if space.planar:
         theta = vector("theta_p", 1)
-        lead += [
+        equations_ += [
             Equation("angular velocity", w, C * theta + vector("D_theta", 1)),
             Equation("angular acceleration", wd, A * theta + vector("B_theta", 1)),
         ]
     else:
-        lead += [
+        equations_ += [
             Equation("angular velocity", w, vector("D_w", 3)),
             Equation("angular acceleration", wd, vector("B_w", 3)),
         ]
     size = space.shifts
-    felt = A * vector("r_p", size) + vector("B_r", size) - vector("g", size)
-    lead.append(
-        Equation("acceleration less gravity, frame axes", vector("a", size), rotation.T * felt)
+    specific_acceleration = A * vector("r_p", size) + vector("B_r", size) - vector("g", size)
+    equations_.append(
+        Equation(
+            "acceleration less gravity, frame axes",
+            vector("a", size),
+            rotation.T * specific_acceleration,
+        )
     )
     if modes:
         eta, etad, etadd = (vector(name, modes) for name in (ETA, "etad", "etadd"))
-        lead += [
+        equations_ += [
             Equation("modal speeds", etad, C * eta + vector("D_eta", modes)),
             Equation("modal accelerations", etadd, A * eta + vector("B_eta", modes)),
         ]
-    return tuple(lead)
+    return tuple(equations_)
 
 
-def _axes(space: Space) -> sp.Basic:
+def _frame_axes(space: Space) -> sp.Basic:
     if not space.planar:
         return sp.MatrixSymbol("R_p", 3, 3)
     theta = vector("theta_p", 1)[0, 0]
@@ -127,28 +131,28 @@ def _axes(space: Space) -> sp.Basic:
     return Matrix([[cosine, -sine], [sine, cosine]])
 
 
-def _linearised(
-    space: Space, modes: int, solved: Equations, letters: Letters
+def _linearised_equations(
+    space: Space, modes: int, solved: Equations, letters: SymbolTable
 ) -> tuple[Equation, ...]:
     """Residual at the predictor and Z = A M + C dR/dyd + dR/dy, turned to inertial axes."""
     size = space.rigid + modes
     mass, rates, shape = (sp.MatrixSymbol(name, size, size) for name in ("M", "N_b", "L_b"))
     rows, impedance = vector("F_b", size), sp.MatrixSymbol("Z", size, size)
-    turning, axes = sp.eye(size), sp.eye(size)
+    rotation_rows, axes = sp.eye(size), sp.eye(size)
     if not space.planar:
-        turning[3:6, 3:6] = TURN.as_explicit()
+        rotation_rows[3:6, 3:6] = TANGENT_OPERATOR.as_explicit()
     rotation = sp.MatrixSymbol("R", space.shifts, space.shifts).as_explicit()
     axes[: space.shifts, : space.shifts] = rotation
     if not space.planar:
         axes[3:6, 3:6] = rotation
-    x, t = sp.MatrixSymbol("X", size, size), Matrix(turning)
+    x, t = sp.MatrixSymbol("X", size, size), Matrix(rotation_rows)
     dynamic = A * mass + C * rates
     return (
         Equation("residual, frame axes", rows, letters.back(solved.rows)),
         Equation("mass matrix", mass, letters.back(solved.mass), "", "d F_b / d ydd"),
         Equation("by the speeds", rates, letters.back(solved.rates), "", "d F_b / d yd"),
         Equation(
-            "by the coordinates", shape, _shape(space, modes, solved, letters),
+            "by the coordinates", shape, _coordinate_derivative(space, modes, solved, letters),
             "", "d F_b / d y; the frame's turn moves a and the rows themselves",
         ),
         Equation("frame axes of rows and columns", x, Matrix(axes)),
@@ -158,28 +162,34 @@ def _linearised(
             "", "Z = A M + C dR/dyd + dR/dy, inertial axes",
         ),
         Equation(
-            "residual at the predictor", vector("F", size), x * rows - _external(space, modes)
+            "residual at the predictor", vector("F", size), x * rows - _external_loads(space, modes)
         ),
     )  # fmt: skip
 
 
-def _shape(space: Space, modes: int, solved: Equations, letters: Letters) -> Matrix:
+def _coordinate_derivative(
+    space: Space, modes: int, solved: Equations, letters: SymbolTable
+) -> Matrix:
     """Columns of r (none), of the frame's turn, and of eta."""
     size, shifts, turns = space.rigid + modes, space.shifts, space.turns
     a, mass, rows = vector("a", shifts), sp.MatrixSymbol("M", size, size), vector("F_b", size)
     by_a = Matrix(size, shifts, lambda i, j: mass[i, j])
     force = Matrix(shifts, 1, lambda i, _: rows[i, 0])
-    carried = -by_a * perp(a) if space.planar else by_a * tilde(a)
-    turned = sp.zeros(size, turns)
+    acceleration_part = -by_a * rotate_plane_column(a) if space.planar else by_a * tilde(a)
+    rotation_part = sp.zeros(size, turns)
     if space.planar:
-        turned[:2, :] = perp(force)
+        rotation_part[:2, :] = rotate_plane_column(force)
     else:
         moment = Matrix(3, 1, lambda i, _: rows[3 + i, 0])
-        turned[:3, :], turned[3:6, :] = -tilde(force), -tilde(moment)
-    columns = [sp.zeros(size, shifts), sp.Matrix(carried) + turned, letters.back(solved.shape)]
+        rotation_part[:3, :], rotation_part[3:6, :] = -tilde(force), -tilde(moment)
+    columns = [
+        sp.zeros(size, shifts),
+        sp.Matrix(acceleration_part) + rotation_part,
+        letters.back(solved.shape),
+    ]
     return Matrix(sp.Matrix.hstack(*(c for c in columns if c.cols)))
 
 
-def _external(space: Space, modes: int) -> Matrix:
+def _external_loads(space: Space, modes: int) -> Matrix:
     blocks = [("f_r", space.shifts), ("f_m", space.turns), ("f_eta", modes)]
     return Matrix([vector(name, k)[i, 0] for name, k in blocks if k for i in range(k)])

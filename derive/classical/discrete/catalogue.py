@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, partial
 
-from ...language.derivation import Derivation
+from ...definition.derivation import Derivation
 from . import body as flexible_body
-from . import joint as flexible_joint
-from . import spring as flexible_spring
-from .hinge import pairing
+from . import rigid_hinges as flexible_joint
+from . import spring_hinges as flexible_spring
+from .body_options import BodyStatement
+from .hinge import named_pairing
 from .state import PLANE, SPACE
-from .statement import BodyStatement
 
 #: Modes of the beams beside the generated hinges.
 PLANAR_MODES, SPATIAL_MODES = 3, 2
@@ -67,7 +67,7 @@ Maker = Callable[..., Derivation]
 #: Name -> maker, plane or space, and by pairing (sources, equation of the matrix).
 HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
     "hinge_fixed_planar": (
-        partial(flexible_joint.fixed, number="(8.130)"), True,
+        partial(flexible_joint.fixed_hinge, number="(8.130)"), True,
         {
             "rigid_rigid": ("section 8.7", "section 8.7"),
             "rigid_beam": ("section 8.7, (8.130) to (8.137)", "(8.137)"),
@@ -76,7 +76,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_smooth_planar": (
-        partial(flexible_joint.smooth, number="(8.94), (8.95)"), True,
+        partial(flexible_joint.smooth_hinge, number="(8.94), (8.95)"), True,
         {
             "rigid_rigid": ("section 8.5, (7.219), (8.102)", "(7.219)"),
             "rigid_beam": ("section 8.5, (8.90) to (8.101)", "(8.101)"),
@@ -85,7 +85,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_spring_planar": (
-        flexible_spring.planar, True,
+        flexible_spring.planar_spring, True,
         {
             "rigid_rigid": ("section 8.6, (8.106) to (8.111); section 7.6", "section 7.6"),
             "rigid_beam": ("section 8.6, (8.122) to (8.125)", "(8.125)"),
@@ -94,7 +94,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_fixed_spatial": (
-        partial(flexible_joint.fixed, number="(8.194) to (8.196)"), False,
+        partial(flexible_joint.fixed_hinge, number="(8.194) to (8.196)"), False,
         {
             "rigid_rigid": ("section 8.10", "section 8.10"),
             "rigid_beam": ("section 8.10, (8.187) to (8.193)", "(8.193)"),
@@ -103,7 +103,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_ball_spatial": (
-        partial(flexible_joint.smooth, number="(8.203)"), False,
+        partial(flexible_joint.smooth_hinge, number="(8.203)"), False,
         {
             "rigid_rigid": ("section 8.11", "section 8.11"),
             "rigid_beam": ("section 8.11, (8.202) to (8.207)", "(8.207)"),
@@ -112,7 +112,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_pin_spatial": (
-        partial(flexible_joint.pin, number="cf. (8.203)"), False,
+        partial(flexible_joint.pin_hinge, number="cf. (8.203)"), False,
         {
             "rigid_rigid": ("section 8.11 with one axis free", "cf. section 8.11"),
             "rigid_beam": ("(8.202) to (8.207) with one axis free", "cf. (8.207)"),
@@ -121,7 +121,7 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
         },
     ),
     "hinge_elastic_spatial": (
-        flexible_spring.spatial, False,
+        flexible_spring.spatial_spring, False,
         {
             "rigid_rigid": ("section 8.12, (8.212) to (8.216)", "section 8.12"),
             "rigid_beam": ("section 8.12, (8.228), (8.229)", "(8.229)"),
@@ -132,17 +132,19 @@ HINGES: dict[str, tuple[Maker, bool, dict[str, tuple[str, str]]]] = {
 }  # fmt: skip
 
 
-def _hinge(name: str, which: str) -> Derivation:
-    make, planar, numbers = HINGES[name]
-    pair = pairing(PLANE if planar else SPACE, which, PLANAR_MODES if planar else SPATIAL_MODES)
-    return make(pair, f"{name}_{which}", *numbers[which])
+def _hinge_derivation(name: str, which: str) -> Derivation:
+    make_derivation, planar, numbers = HINGES[name]
+    pair = named_pairing(
+        PLANE if planar else SPACE, which, PLANAR_MODES if planar else SPATIAL_MODES
+    )
+    return make_derivation(pair, f"{name}_{which}", *numbers[which])
 
 
 #: Name -> derivation, made once.
-FLEXIBLE: dict[str, Callable[[], Derivation]] = {
+DISCRETE_DERIVATIONS: dict[str, Callable[[], Derivation]] = {
     **{body.element: cache(partial(flexible_body.derivation, body)) for body in BODIES},
     **{
-        f"{name}_{which}": cache(partial(_hinge, name, which))
+        f"{name}_{which}": cache(partial(_hinge_derivation, name, which))
         for name, (_, _, numbers) in HINGES.items()
         for which in numbers
     },
@@ -150,7 +152,7 @@ FLEXIBLE: dict[str, Callable[[], Derivation]] = {
 
 #: Those of which the discrete-time method makes its steps: rigid bodies and beams with the largest
 #: number of modes (a beam with fewer leaves some idle), and every hinge.
-STEPPED = (
+STEPPING_ELEMENTS = (
     "body_planar_discrete", "beam_planar_discrete", "body_spatial_discrete",
     "beam_spatial_discrete",
     *(f"{name}_{which}" for name, (_, _, numbers) in HINGES.items() for which in numbers),

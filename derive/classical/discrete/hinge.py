@@ -18,9 +18,9 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from ...language.derivation import Derivation, Equation, Quantity, Solve, vector
-from ...language.notation import Matrix, solve_linear
-from ..state import State, closed
+from ...definition.derivation import Derivation, Equation, Quantity, Solve, vector
+from ...definition.notation import Matrix, solve_linear
+from ..state_vector import StateVector, append_affine_row
 from .state import BOOK, Space
 
 #: Which bodies a hinge joins, inboard first.
@@ -36,12 +36,12 @@ class Pairing:
     outboard: int
 
     @property
-    def state_in(self) -> State:
+    def state_in(self) -> StateVector:
         """State at the hinge's input end: coordinates of the inboard body."""
         return self.space.state(self.inboard)
 
     @property
-    def state_out(self) -> State:
+    def state_out(self) -> StateVector:
         """State at its output end: coordinates of the outboard body."""
         return self.space.state(self.outboard)
 
@@ -60,13 +60,13 @@ class Pairing:
         return f"{kinds[0]} inboard, {kinds[1]} outboard"
 
 
-def pairing(space: Space, name: str, modes: int) -> Pairing:
+def named_pairing(space: Space, name: str, modes: int) -> Pairing:
     """The pairing called `name`; every beam has `modes` modes."""
     inboard, outboard = (modes * int(side == "beam") for side in name.split("_"))
     return Pairing(space, inboard, outboard)
 
 
-def _block(state: State, name: str, end: str) -> sp.MatrixSymbol:
+def _block(state: StateVector, name: str, end: str) -> sp.MatrixSymbol:
     return vector(f"{name}_{end}", state.sizes[state.names.index(name)])
 
 
@@ -108,14 +108,14 @@ def derivation(hinge: FlexibleHinge) -> Derivation:
                 sp.MatrixSymbol("U_h", n_out, n_in), pair.state_out.unit, "matrix, z_O = U_h z_I"
             ),
         ),
-        definitions=(*hinge.definitions, *_elimination(hinge)),
-        premises=(*hinge.premises, *_vibration(hinge), *hinge.conditions),
+        definitions=(*hinge.definitions, *_elimination_equations(hinge)),
+        premises=(*hinge.premises, *_vibration_premise(hinge), *hinge.conditions),
         sources=(f"{BOOK}, {hinge.source}",),
-        notes=(f"{pair.shown.capitalize()}. {_NOTE}", *hinge.notes),
+        notes=(f"{pair.shown.capitalize()}. {_STATE_NOTE}", *hinge.notes),
     )
 
 
-_NOTE = (
+_STATE_NOTE = (
     "Same states, predictor and linear time map as the bodies' matrices "
     "(classical_beam_planar_discrete, classical_beam_spatial_discrete)."
 )
@@ -123,17 +123,17 @@ _NOTE = (
 
 def _body_inputs(hinge: FlexibleHinge) -> tuple[Quantity, ...]:
     """What the hinge needs of the outboard body's own matrices."""
-    n, found = hinge.pairing.state_out.length, []
+    n, quantities = hinge.pairing.state_out.length, []
     if hinge.next_rows is not None:
         unit = hinge.pairing.state_out.unit
-        found.append(Quantity(sp.MatrixSymbol("U", n, n), unit, "matrix of the outboard body"))
+        quantities.append(Quantity(sp.MatrixSymbol("U", n, n), unit, "matrix of the outboard body"))
     if hinge.pairing.outboard:
         rows = sp.MatrixSymbol("W", hinge.pairing.outboard, n)
-        found.append(Quantity(rows, "N", "modal rows of the outboard body"))
-    return tuple(found)
+        quantities.append(Quantity(rows, "N", "modal rows of the outboard body"))
+    return tuple(quantities)
 
 
-def _vibration(hinge: FlexibleHinge) -> tuple[Equation, ...]:
+def _vibration_premise(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     """W z_O = 0, as a premise."""
     pair = hinge.pairing
     if not pair.outboard:
@@ -150,13 +150,13 @@ def _vibration(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     )  # fmt: skip
 
 
-def _elimination(hinge: FlexibleHinge) -> tuple[Equation, ...]:
+def _elimination_equations(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     pair = hinge.pairing
     n_in, n_out = pair.state_in.length, pair.state_out.length
-    carry, free = hinge.carry or carried(hinge)
-    whole = sp.MatrixSymbol("U_h", n_out, n_in)
+    carry, free = hinge.carry or elimination_matrices(hinge)
+    transfer_symbol = sp.MatrixSymbol("U_h", n_out, n_in)
     if not free.cols:
-        return (Equation("transfer matrix", whole, carry, hinge.equation),)
+        return (Equation("transfer matrix", transfer_symbol, carry, hinge.equation),)
     e, g = sp.MatrixSymbol("E", n_out, n_in), sp.MatrixSymbol("G", n_out, free.cols)
     rows, gain = (
         sp.MatrixSymbol("V", free.cols, n_out),
@@ -165,13 +165,13 @@ def _elimination(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     return (
         Equation("carried state", e, carry, "", "z_O at x = 0"),
         Equation("free unknowns", g, free, "", "d z_O / d x, x = [own freedom; eta_O]"),
-        Equation("conditions", rows, _conditions(hinge), "", "V z_O = 0"),
+        Equation("conditions", rows, _condition_rows(hinge), "", "V z_O = 0"),
         Equation("gain", gain, Solve(rows * g, rows * e), "", "x = -K z_I"),
-        Equation("transfer matrix", whole, e - g * gain, hinge.equation),
+        Equation("transfer matrix", transfer_symbol, e - g * gain, hinge.equation),
     )
 
 
-def _conditions(hinge: FlexibleHinge) -> sp.Basic:
+def _condition_rows(hinge: FlexibleHinge) -> sp.Basic:
     n = hinge.pairing.state_out.length
     blocks: list[sp.Basic] = []
     if hinge.next_rows is not None:
@@ -181,19 +181,21 @@ def _conditions(hinge: FlexibleHinge) -> sp.Basic:
     return blocks[0] if len(blocks) == 1 else sp.BlockMatrix([[block] for block in blocks])
 
 
-def carried(hinge: FlexibleHinge) -> tuple[Matrix, Matrix]:
+def elimination_matrices(hinge: FlexibleHinge) -> tuple[Matrix, Matrix]:
     """E and G of z_O = E z_I + G x, solved from the relations."""
     pair = hinge.pairing
-    unknown: Sequence[sp.MatrixSymbol] = pair.state_out.at("O")
-    own = (hinge.free,) if hinge.free is not None else ()
+    unknowns: Sequence[sp.MatrixSymbol] = pair.state_out.at("O")
+    free_unknowns = (hinge.free,) if hinge.free is not None else ()
     inner = pair.state_in.length - 1
     relations = hinge.relations
     if pair.outboard:
         coordinates = vector("x_eta", pair.outboard)
         relations = (*relations, Equation("", pair.at_output("eta"), coordinates))
-        own = (*own, coordinates)
-    rows = solve_linear(relations, unknown, (*pair.state_in.at("I"), *own))
-    count = sum(int(symbol.rows) for symbol in own)
-    left = rows[:, :inner].row_join(rows[:, inner + count :])
-    middle = rows[:, inner : inner + count]
-    return closed(Matrix(left)), Matrix(sp.Matrix(middle).col_join(sp.zeros(1, count)))
+        free_unknowns = (*free_unknowns, coordinates)
+    rows = solve_linear(relations, unknowns, (*pair.state_in.at("I"), *free_unknowns))
+    count = sum(int(symbol.rows) for symbol in free_unknowns)
+    carried_state = rows[:, :inner].row_join(rows[:, inner + count :])
+    free_columns = rows[:, inner : inner + count]
+    return append_affine_row(Matrix(carried_state)), Matrix(
+        sp.Matrix(free_columns).col_join(sp.zeros(1, count))
+    )

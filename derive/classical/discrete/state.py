@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ...language.derivation import tilde
-from ...language.notation import Matrix
-from ..state import State
+from ...definition.derivation import tilde
+from ...definition.notation import Matrix
+from ..state_vector import StateVector
 
 BOOK = "Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8"
 
@@ -33,13 +33,13 @@ class Space:
         """Rigid degrees of freedom."""
         return self.shifts + self.turns
 
-    def state(self, modes: int) -> State:
+    def state(self, modes: int) -> StateVector:
         """The state vector of an end of a body with so many modes."""
-        own = bool(modes)
-        return State(
-            ("r", self.angle, "m", "q", *("eta",) * own),
-            (self.shifts, self.turns, self.turns, self.shifts, *(modes,) * own),
-            ("m", "rad", "N*m", "N", *("m",) * own, "1"),
+        has_modes = bool(modes)
+        return StateVector(
+            ("r", self.angle, "m", "q", *("eta",) * has_modes),
+            (self.shifts, self.turns, self.turns, self.shifts, *(modes,) * has_modes),
+            ("m", "rad", "N*m", "N", *("m",) * has_modes, "1"),
         )
 
     def length(self, modes: int) -> int:
@@ -48,18 +48,18 @@ class Space:
 
     def moment(self, lever: sp.Basic, force: sp.Basic) -> sp.Basic:
         """lever x force, for a column `lever` and the rows `force` of a state (or a column)."""
-        return perp(lever).T * force if self.planar else tilde(lever) * force
+        return rotate_plane_column(lever).T * force if self.planar else tilde(lever) * force
 
     def turned(self, column: sp.Basic, angle: sp.Basic) -> sp.Basic:
         """angle x column, for the rows `angle` of a small rotation."""
-        return perp(column) * angle if self.planar else -tilde(column) * angle
+        return rotate_plane_column(column) * angle if self.planar else -tilde(column) * angle
 
     def change_moment(self, change: sp.Basic, force: sp.Basic) -> sp.Basic:
         """change x force, for the rows `change` of a small displacement and a column `force`."""
-        return -perp(force).T * change if self.planar else -tilde(force) * change
+        return -rotate_plane_column(force).T * change if self.planar else -tilde(force) * change
 
 
-def perp(column: sp.Basic) -> Matrix:
+def rotate_plane_column(column: sp.Basic) -> Matrix:
     """A plane column turned by +90 degrees, entry by entry."""
     return Matrix([-column[1, 0], column[0, 0]])
 
@@ -67,23 +67,23 @@ def perp(column: sp.Basic) -> Matrix:
 PLANE, SPACE = Space(True), Space(False)
 
 
-def rows_of(state: State, name: str) -> Matrix:
+def rows_of(state: StateVector, name: str) -> Matrix:
     """Rows of the unit matrix that pick the block `name` out of a state ("1": the last number)."""
-    starts = dict(zip(state.names, _starts(state), strict=True)) | {"1": state.length - 1}
+    starts = dict(zip(state.names, _block_starts(state), strict=True)) | {"1": state.length - 1}
     sizes = dict(zip(state.names, state.sizes, strict=True)) | {"1": 1}
-    first = starts[name]
-    return Matrix(sizes[name], state.length, lambda i, j: int(j == first + i))
+    start = starts[name]
+    return Matrix(sizes[name], state.length, lambda i, j: int(j == start + i))
 
 
-def _starts(state: State) -> list[int]:
+def _block_starts(state: StateVector) -> list[int]:
     return [sum(state.sizes[:k]) for k in range(len(state.sizes))]
 
 
-def part(matrix: sp.MatrixSymbol, first: int, count: int) -> Matrix:
+def row_block(matrix: sp.MatrixSymbol, first: int, count: int) -> Matrix:
     """`count` rows of a matrix symbol."""
     return Matrix(count, int(matrix.cols), lambda i, j: matrix[first + i, j])
 
 
-def constant(column: sp.Basic, state: State) -> sp.MatrixExpr:
+def constant_rows(column: sp.Basic, state: StateVector) -> sp.MatrixExpr:
     """`column` in the last column of rows on a state."""
     return column * rows_of(state, "1")

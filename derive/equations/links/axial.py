@@ -19,14 +19,13 @@ from __future__ import annotations
 
 import sympy as sp
 
-from ...language.derivation import Derivation, Equation, Quantity, tilde
-from ...language.element import Body
-from .. import body as body_kernels
-from ..algebra import part, stack, symbol
-from ..eliminate import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
+from ...definition.derivation import Derivation, Equation, Quantity, tilde
+from ...definition.element import Body
+from .. import user_body as body_kernels
+from ..block_matrices import part, stack, symbol
 from ..hinge import HingeMotion, HingePlace, hinge_quantities
-from ..screw import OUT_E, OUT_S, Stage
-from ..sweep import (
+from ..hinge_elimination import REDUCED_E, REDUCED_S, eliminate, with_unit_columns
+from ..riccati_sweep import (
     DELTA,
     MOTION,
     PARENT_DELTA,
@@ -38,6 +37,7 @@ from ..sweep import (
     gains,
     unit_directions,
 )
+from ..screw_transport import OUT_E, OUT_S, Stage
 
 LINK = Quantity(
     symbol("link", 5), "", "screw about x: cosine, sine, shift (m); angle and shift of z at q = 0"
@@ -109,7 +109,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
             *_about_x().behind(PARENT_MOTION.symbol, between),
             Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
             *_about_z().behind(between, rest),
-            Equation("bias motion", MOTION.symbol, moved(motion, rest)),
+            Equation("bias motion", MOTION.symbol, body_motion(motion, rest)),
             Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
@@ -117,7 +117,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
     )
 
 
-def moved(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
+def body_motion(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
     """Motion of P from that of Q in P axes: the hinge's own velocity and acceleration added."""
     w, wd, rdd = (part(rest, n) for n in (0, 3, 6))
     v_own, w_own = motion.in_arrays(motion.velocity), motion.in_arrays(motion.spin)

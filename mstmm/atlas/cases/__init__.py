@@ -7,39 +7,39 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from ...errors import SceneError
-from ...scene.rules.messages import near
-from ..definition import Definition
+from ...scene.validators.validation_messages import did_you_mean
+from ..case_definition import CaseDefinition
 
 #: Folders of the cases, in the order of the page.
 GROUPS = ("products", "sweeps", "steps", "classical", "rotations", "loops", "flexible")
 
 
-def _files() -> dict[str, str]:
+def _modules_by_name() -> dict[str, str]:
     """Module of each case, by name."""
-    found = {}
+    modules = {}
     for group in GROUPS:
         folder = import_module(f".{group}", __name__)
         for file in sorted(module.name for module in pkgutil.iter_modules(folder.__path__)):
-            found[file.replace("_", "-")] = f".{group}.{file}"
-    return found
+            modules[file.replace("_", "-")] = f".{group}.{file}"
+    return modules
 
 
-def names() -> tuple[str, ...]:
+def case_names() -> tuple[str, ...]:
     """Names of all cases."""
-    return tuple(_files())
+    return tuple(_modules_by_name())
 
 
-def chosen(wanted: Sequence[str] | None) -> tuple[Definition, ...]:
+def select_cases(wanted: Sequence[str] | None) -> tuple[CaseDefinition, ...]:
     """Definitions of the cases of these names, without duplicates; default: all cases.
 
     Raises SceneError, with the nearest name, for an unknown name.
     """
-    files = _files()
+    files = _modules_by_name()
     for name in wanted or ():
         if name not in files:
             raise SceneError(
-                f'case "{name:.60}": there is no such case{near(name, files)} '
+                f'case "{name:.60}": there is no such case{did_you_mean(name, files)} '
                 "(mstmm stability --list shows all)"
             )
-    each = dict.fromkeys(wanted or files)
-    return tuple(import_module(files[name], __name__).CASE for name in each)
+    selected = dict.fromkeys(wanted or files)
+    return tuple(import_module(files[name], __name__).CASE for name in selected)

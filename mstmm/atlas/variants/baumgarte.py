@@ -9,32 +9,39 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array
-from ...runtime.engine.loops.calls import LoopCalls
+from ...array_validation import Array
+from ...runtime.engine.loops.loop_calls import LoopCalls
 from ...runtime.model.model import Model
 from .runge_kutta import rk4_step
 
 
-def gap_of(model: Model, step: float, steps: int, rate: float) -> float:
+def largest_gap(model: Model, step: float, steps: int, rate: float) -> float:
     """Largest gap (m, rad) in `steps` steps (s) of rk4 with alpha = `rate` (1/s).
 
     For hinges whose coordinates are integrals of their speeds.  NaN if a state is not finite.
     """
     engine, (q, u) = model.looped, model.initial_state()
-    calls, memory, split = LoopCalls(engine, q), np.atleast_2d(engine.start_memory()), model.nq
+    calls, memory, position_count = (
+        LoopCalls(engine, q),
+        np.atleast_2d(engine.start_memory()),
+        model.nq,
+    )
 
-    def slope(y: Array) -> Array:
-        q, u = np.ascontiguousarray(y[:split]), np.ascontiguousarray(y[split:])
+    def state_rate(y: Array) -> Array:
+        q, u = np.ascontiguousarray(y[:position_count]), np.ascontiguousarray(y[position_count:])
         rates = engine.accelerations(0.0, q[None], u[None], memory)
-        closing = calls.correction(calls.gap, q, u)[0]
-        stopping = calls.correction(calls.slip, q, u)[0]
-        return np.append(rates[0][0], rates[1][0] + rate**2 * closing + 2 * rate * stopping)
+        position_correction = calls.correction(calls.gap, q, u)[0]
+        velocity_correction = calls.correction(calls.slip, q, u)[0]
+        return np.append(
+            rates[0][0],
+            rates[1][0] + rate**2 * position_correction + 2 * rate * velocity_correction,
+        )
 
     y, largest = np.append(q, u), 0.0
     for _ in range(steps):
-        y = rk4_step(slope, y, step)
+        y = rk4_step(state_rate, y, step)
         if not np.isfinite(y).all() or np.abs(y).max() > 1e6:
             return float("nan")
-        gap = calls.correction(calls.gap, np.ascontiguousarray(y[:split]), u)[1]
+        gap = calls.correction(calls.gap, np.ascontiguousarray(y[:position_count]), u)[1]
         largest = max(largest, float(np.abs(gap).max()))
     return largest

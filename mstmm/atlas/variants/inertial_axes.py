@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Array
+from ...array_validation import Array
 from ...errors import NumericalFailure
-from ...runtime.kernels import prebuilt
+from ...runtime.kernels import prebuilt_kernels
 
 #: Lengths of a bias motion, of S, and of e, gains and deviations.
-_MOTION, _S, _VECTOR = 9, 21, 6
+_MOTION_LENGTH, _S_LENGTH, _VECTOR_LENGTH = 9, 21, 6
 
 #: Rotation of a hinge between parallel axes, and zero shift and drift.
-_ALIKE, _NONE = np.eye(3).ravel(), np.zeros(6)
+_IDENTITY, _ZEROS = np.eye(3).ravel(), np.zeros(6)
 
 
 def accelerations(
@@ -32,28 +32,44 @@ def accelerations(
         gravity: (3,), m/s^2.
     """
     sweep, rigid = _Kernels("sweep", "generic1"), _Kernels("body", "rigid")
-    n, none, subspace = len(rates), _NONE[:3], np.concatenate([_NONE[:3], pin])
+    n, zero_vector, subspace = len(rates), _ZEROS[:3], np.concatenate([_ZEROS[:3], pin])
     steps = np.diff(points, axis=0, prepend=np.zeros((1, 3)))
-    motion, udot = np.zeros((n + 1, _MOTION)), np.zeros((n, 1))
-    S, e, deviation = (np.zeros((n + 1, size)) for size in (_S, _VECTOR, _VECTOR))
-    gains, terms, spare = np.zeros((n, _VECTOR)), np.zeros((n, 1)), np.zeros(9)
+    motion, udot = np.zeros((n + 1, _MOTION_LENGTH)), np.zeros((n, 1))
+    S, e, deviation = (
+        np.zeros((n + 1, size)) for size in (_S_LENGTH, _VECTOR_LENGTH, _VECTOR_LENGTH)
+    )
+    gains, terms, unused = np.zeros((n, _VECTOR_LENGTH)), np.zeros((n, 1)), np.zeros(9)
     motion[-1, 6:] = -gravity  # index -1 is the ground, inboard of the first body
     for i in range(n):
-        sweep("forward", (_ALIKE, steps[i], _ALIKE, none, subspace, none, rates[i] * pin, _NONE,
-                          _NONE[:1], motion[i - 1]), (spare, spare[:3], motion[i]))  # fmt: skip
-        numbers = _turned(body, axes[i])
+        sweep(
+            "forward",
+            (
+                _IDENTITY,
+                steps[i],
+                _IDENTITY,
+                zero_vector,
+                subspace,
+                zero_vector,
+                rates[i] * pin,
+                _ZEROS,
+                _ZEROS[:1],
+                motion[i - 1],
+            ),
+            (unused, unused[:3], motion[i]),
+        )
+        numbers = _rotated_inertia(body, axes[i])
         rigid("inertia", (numbers,), (S[i],))
         rigid("bias_load", (numbers, motion[i]), (e[i],))
     for i in reversed(range(n)):
-        sweep("condense", (_ALIKE, steps[i], subspace, _NONE[:1], _NONE[:2], S[i], e[i],
-                           _NONE[:1]), (gains[i], terms[i], S[i - 1], e[i - 1]))  # fmt: skip
+        sweep("condense", (_IDENTITY, steps[i], subspace, _ZEROS[:1], _ZEROS[:2], S[i], e[i],
+                           _ZEROS[:1]), (gains[i], terms[i], S[i - 1], e[i - 1]))  # fmt: skip
     for i in range(n):
-        sweep("recover", (_ALIKE, steps[i], subspace, gains[i], terms[i], deviation[i - 1]),
+        sweep("recover", (_IDENTITY, steps[i], subspace, gains[i], terms[i], deviation[i - 1]),
               (udot[i], deviation[i]))  # fmt: skip
     return udot[:, 0]
 
 
-def _turned(body: Array, axes: Array) -> Array:
+def _rotated_inertia(body: Array, axes: Array) -> Array:
     """Inertia numbers of a body (10,) in inertial axes."""
     upper, tensor = np.triu_indices(3), np.zeros((3, 3))
     tensor[upper] = body[4:]
@@ -65,10 +81,12 @@ class _Kernels:
     """Compiled kernels of an element, called with arrays."""
 
     def __init__(self, kind: str, name: str) -> None:
-        self._ffi, _ = prebuilt.module()
-        found = prebuilt.element(kind, name)
-        records = (found.descriptor.kernels[i] for i in range(found.descriptor.n_kernels))
-        self._calls = {prebuilt.text(self._ffi, record.name): record.call for record in records}
+        self._ffi, _ = prebuilt_kernels.module()
+        element = prebuilt_kernels.element(kind, name)
+        records = (element.descriptor.kernels[i] for i in range(element.descriptor.n_kernels))
+        self._calls = {
+            prebuilt_kernels.text(self._ffi, record.name): record.call for record in records
+        }
 
     def __call__(self, kernel: str, given: tuple[Array, ...], taken: tuple[Array, ...]) -> None:
         """Call a kernel.  Raises NumericalFailure if a guard is violated."""

@@ -8,32 +8,32 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import NumericalFailure
-from ...runtime.engine.tangent import Tangent
+from ...runtime.engine.tangent_matrix import TangentMatrix
 from ...runtime.model.model import Model
 
 #: Change of speeds at which an iteration has converged, relative to that of the step.
-_END = 1e-8
+_CONVERGENCE_TOLERANCE = 1e-8
 
 
-def iterations(model: Model, step: float, steps: int, most: int) -> float:
+def mean_iterations(model: Model, step: float, steps: int, most: int) -> float:
     """Mean number of iterations per step, for `steps` steps (s) from the start.
 
     For scenes whose speeds are the rates of their coordinates.  Raises NumericalFailure if a step
     needs more than `most`.
     """
-    tangent, taken, rate = Tangent(model.looped), 0, 2.0 / step
+    tangent, iteration_count, rate = TangentMatrix(model.looped), 0, 2.0 / step
     q, u = model.initial_state()
     a = model.accelerations(q, u)
     for number in range(1, steps + 1):
         q, u, speed = q + step * u + step**2 / 2 * a, u + step * a, u
         for _ in range(most):
-            taken += 1
+            iteration_count += 1
             residual = tangent.residual(number * step, q, u, a)
             tangent.factor_laws(rate, rate)
             change = tangent.solve_laws(-residual)
             q, u, a = q + change / rate**2, u + change / rate, a + change
-            if np.abs(change).max() <= _END * rate * np.abs(u - speed).max():
+            if np.abs(change).max() <= _CONVERGENCE_TOLERANCE * rate * np.abs(u - speed).max():
                 break
         else:
             raise NumericalFailure(f"step {number}: not converged after {most} iterations")
-    return taken / steps
+    return iteration_count / steps

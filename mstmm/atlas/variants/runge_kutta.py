@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from ...arrays import Array
+from ...array_validation import Array
 
 
 def rk4_step(slope: Callable[[Array], Array], y: Array, step: float) -> Array:

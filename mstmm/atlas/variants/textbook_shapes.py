@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Array
-from ...runtime.flexible.beam.shapes import root
+from ...array_validation import Array
+from ...runtime.flexible.beam.shape_functions import root
 
 
-def clamped_free(number: int, xi: Array) -> Array:
+def clamped_free_shape(number: int, xi: Array) -> Array:
     """Shape `number` at positions `xi`, relative to the length, with int phi^2 dxi = 1.
 
     Rao, Vibration of Continuous Systems, ch. 11; beta from the common root of all shapes.

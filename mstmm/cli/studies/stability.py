@@ -19,66 +19,82 @@ def stability(
     ] = None,
     out: Annotated[
         str | None,
-        typer.Option("--out", metavar="DIR", help="Output folder for atlas.json, atlas.md and "
-                     "plots."),
+        typer.Option(
+            "--out", metavar="DIR", help="Output folder for atlas.json, atlas.md and plots."
+        ),
     ] = None,
     only_list: Annotated[
         bool, typer.Option("--list", help="List the cases; nothing is computed.")
     ] = False,
     json: Json = False,
-) -> None:  # fmt: skip
+) -> None:
     """Locate the parameter values at which methods fail, and the range of each remedy."""
     if only_list:
-        _list(case, json)
+        _list_cases(case, json)
         return
     if out is None:
         raise typer.BadParameter("give the output folder, --out DIR, or --list")
     from mstmm.atlas import cases
 
-    from .. import output
-    from ..extras import install, missing
+    from .. import terminal_output
+    from ..extra_checks import install_command, missing_packages
 
-    left_out = [one for one in cases.chosen(case) if one.lacks and not case]
-    folder, lacking = output_folder(out, "atlas.json"), missing("plot")
-    atlas = _found(case)
-    files = atlas.save(folder, pictures=not lacking)
+    omitted_cases = [
+        definition for definition in cases.select_cases(case) if definition.lacks and not case
+    ]
+    folder, missing_plot_packages = output_folder(out, "atlas.json"), missing_packages("plot")
+    atlas = _measure_atlas(case)
+    files = atlas.save(folder, pictures=not missing_plot_packages)
     if json:
-        paths, names = [str(file) for file in files], [one.name for one in left_out]
-        output.emit_json({**atlas.to_dict(), "left_out": names, "files": paths})
+        paths, names = (
+            [str(file) for file in files],
+            [definition.name for definition in omitted_cases],
+        )
+        terminal_output.print_json({**atlas.to_dict(), "left_out": names, "files": paths})
         return
-    _tell(atlas)
-    output.say(f"{folder}: {', '.join(file.name for file in files)}")
-    for one in left_out:
-        output.say(f"left out: {one.name} needs {', '.join(one.lacks)}: {install(one.extra)}")
-    if lacking:
-        output.say(f"no plots: they need {', '.join(lacking)}: {install('plot')}")
+    _print_atlas(atlas)
+    terminal_output.print_lines(f"{folder}: {', '.join(file.name for file in files)}")
+    for definition in omitted_cases:
+        terminal_output.print_lines(
+            f"left out: {definition.name} needs {', '.join(definition.lacks)}: "
+            f"{install_command(definition.extra)}"
+        )
+    if missing_plot_packages:
+        terminal_output.print_lines(
+            f"no plots: they need {', '.join(missing_plot_packages)}: {install_command('plot')}"
+        )
 
 
-def _list(wanted: list[str] | None, json: bool) -> None:
+def _list_cases(wanted: list[str] | None, json: bool) -> None:
     from mstmm.atlas import cases
 
-    from .. import output
+    from .. import terminal_output
 
-    found = cases.chosen(wanted)
+    definitions = cases.select_cases(wanted)
     if json:
         keys = ("name", "title", "parameter", "unit", "measured", "limit", "source")
         rows = [
-            {key: getattr(one, key) for key in keys}
-            | {"method": one.method.name, "remedy": one.remedy.name}
-            for one in found
+            {key: getattr(definition, key) for key in keys}
+            | {"method": definition.method.name, "remedy": definition.remedy.name}
+            for definition in definitions
         ]
-        output.emit_json({"cases": rows})
+        terminal_output.print_json({"cases": rows})
         return
-    lines = [(one.name, one.title, one.parameter, one.remedy.name) for one in found]
-    output.console().print(output.table("", ("case", "what", "parameter", "remedy"), lines))
+    lines = [
+        (definition.name, definition.title, definition.parameter, definition.remedy.name)
+        for definition in definitions
+    ]
+    terminal_output.table_console().print(
+        terminal_output.build_table("", ("case", "what", "parameter", "remedy"), lines)
+    )
 
 
-def _found(wanted: list[str] | None) -> Atlas:
+def _measure_atlas(wanted: list[str] | None) -> Atlas:
     from mstmm.atlas.atlas import stability as measured
 
-    from ..progress import bar
+    from ..progress import progress_bar
 
-    with bar() as shown:
+    with progress_bar() as shown:
 
         def progress(name: str, number: int, count: int) -> None:
             shown.label(f"case {name}")
@@ -87,14 +103,21 @@ def _found(wanted: list[str] | None) -> Atlas:
         return measured(wanted, progress=progress)
 
 
-def _tell(atlas: Atlas) -> None:
-    from mstmm.atlas.page import frontier, held_to, in_unit, limit
+def _print_atlas(atlas: Atlas) -> None:
+    from mstmm.atlas.page import frontier_text, limit_text, parameter_with_unit, remedy_range
 
-    from .. import output
+    from .. import terminal_output
 
     columns = ("case", "parameter", "fails", "limit>", "remedy", "holds to>")
     rows = [
-        (one.name, in_unit(one), frontier(one), limit(one), one.remedy, held_to(one))
-        for one in atlas.cases
+        (
+            case.name,
+            parameter_with_unit(case),
+            frontier_text(case),
+            limit_text(case),
+            case.remedy,
+            remedy_range(case),
+        )
+        for case in atlas.cases
     ]
-    output.console().print(output.table("", columns, rows))
+    terminal_output.table_console().print(terminal_output.build_table("", columns, rows))

@@ -6,94 +6,107 @@ import math
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING
 
+from ...expression.derivative import dependency_parts, expression_derivatives
 from ...expression.drive import motion_at
 from ...expression.expression import Expression, Name
-from ...expression.parser import around
-from ...expression.slope import parted, slopes
-from ..rules.messages import Problem
-from ..rules.values import Location, found
-from ..tables.hinge_rules import unsmooth
-from .closures import coordinate
-from .inputs import switching
-from .names import flexible, index_problem
+from ...expression.parser import context_of_name
+from ..tables.hinge_rules import drive_problems
+from ..validators.scalars_and_vectors import Location, describe_value
+from ..validators.validation_messages import Problem
+from .expression_names import index_problem, modal_names
+from .inputs import switching_term
+from .loop_closures import resolve_coordinate
 
 if TYPE_CHECKING:
-    from ..tables.all import SceneTables
     from ..tables.closures import Coupling
     from ..tables.hinge import Hinge
+    from ..tables.scene_tables import SceneTables
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
     """Problems of couplings, as far as the types of their hinges are defined."""
-    seen: dict[str, int] = {}
+    first_indices: dict[str, int] = {}
     for i, coupling in enumerate(scene.coupling):
-        place: Location = ("coupling", i, coupling.key)
-        named = [(place, said) for name in coupling.names
-                 if (said := _unknown(scene, name, coupling.key)) is not None]  # fmt: skip
-        yield from named
-        if not named and _are_known(scene, coupling):
-            yield from ((place, said) for said in _no_row(scene, coupling) if said is not None)
-        yield from _right_side(coupling, ("coupling", i, "equals"))
-        first = seen.setdefault(coupling.row.text.replace(" ", ""), i)
-        if first != i:
-            yield place, f"repeats coupling number {first + 1}; leave one out"
+        location: Location = ("coupling", i, coupling.key)
+        name_problems = [
+            (location, message)
+            for name in coupling.names
+            if (message := _unknown_name_message(scene, name, coupling.key)) is not None
+        ]
+        yield from name_problems
+        if not name_problems and _are_types_defined(scene, coupling):
+            yield from (
+                (location, message)
+                for message in _row_messages(scene, coupling)
+                if message is not None
+            )
+        yield from _right_side_problems(coupling, ("coupling", i, "equals"))
+        first_index = first_indices.setdefault(coupling.row.text.replace(" ", ""), i)
+        if first_index != i:
+            yield location, f"repeats coupling number {first_index + 1}; leave one out"
 
 
-def _are_known(scene: SceneTables, coupling: Coupling) -> bool:
+def _are_types_defined(scene: SceneTables, coupling: Coupling) -> bool:
     """Whether the types of all hinges of a coupling are defined."""
     return all(scene.hinges.by_name[name.hinge].facts is not None for name in coupling.names)
 
 
-def _right_side(coupling: Coupling, place: Location) -> Iterator[Problem]:
+def _right_side_problems(coupling: Coupling, place: Location) -> Iterator[Problem]:
     equals = coupling.equals
     if equals is None:
         return
-    others = [name for name in equals.names if name.text != "t"]
-    if others:
-        named = f"{others[0].text!r}{around(equals.text, others[0])}"
-        yield place, f"expected a function of t only, found {named}; move it to the coupling"
+    other_names = [name for name in equals.names if name.text != "t"]
+    if other_names:
+        named_text = f"{other_names[0].text!r}{context_of_name(equals.text, other_names[0])}"
+        yield place, f"expected a function of t only, found {named_text}; move it to the coupling"
     else:
-        yield from unsmooth(equals, place)
+        yield from drive_problems(equals, place)
 
 
 # --- names ----------------------------------------------------------------------------------------
 
 
-def _unknown(scene: SceneTables, name: Name, key: str) -> str | None:
+def _unknown_name_message(scene: SceneTables, name: Name, key: str) -> str | None:
     """Message about a name that is no coordinate or speed of a hinge; None for others."""
     if name.text == "t" or name.text in scene.channels:
         return f"{name.text!r} is no coordinate of a hinge; write functions of time in equals"
     if len(name.parts) == 1:
         return f"{name.text!r} is no coordinate; write the name of a hinge and .q or .u"
-    if name.owner in flexible(scene):
+    if name.owner in modal_names(scene):
         return f"{name.text!r} is no coordinate of a hinge; couplings accept only those of hinges"
     number = scene.hinges.find(name.hinge)
     if number is None:
         return scene.hinges.missing(name.hinge, repr(name.hinge))
     if key == "expression" and name.quantity == "u":
         return f"{name.text!r} is a speed; use speeds in place of expression"
-    return _no_entry(scene.hinges[number], name, key)
+    return _missing_entry_message(scene.hinges[number], name, key)
 
 
-def _no_entry(hinge: Hinge, name: Name, key: str) -> str | None:
+def _missing_entry_message(hinge: Hinge, name: Name, key: str) -> str | None:
     """Message about a coordinate or speed that a hinge does not have; None for others."""
     facts = hinge.facts
     if facts is None:
         return None
-    own = [one.name for one in facts.coordinates]
+    coordinate_names = [coordinate_info.name for coordinate_info in facts.coordinates]
     entry = name.index or 0
     if name.quantity in ("q", "u"):
         entries = facts.coordinates if name.quantity == "q" else facts.speeds
         problem = index_problem(name, hinge.name, len(entries))
         if problem is not None:
             return problem
-    elif name.quantity not in own or name.index is not None:
-        known = "".join(f", {hinge.name}.{one}" for one in own)
-        return f"{name.text!r} is unknown; this hinge has {hinge.name}.q{known}"
+    elif name.quantity not in coordinate_names or name.index is not None:
+        coordinate_text = "".join(
+            f", {hinge.name}.{coordinate_info}" for coordinate_info in coordinate_names
+        )
+        return f"{name.text!r} is unknown; this hinge has {hinge.name}.q{coordinate_text}"
     else:
-        entry = own.index(name.quantity)
-    first = facts.quaternion
-    if key == "expression" and first is not None and first <= entry < first + 4:
+        entry = coordinate_names.index(name.quantity)
+    quaternion_start = facts.quaternion
+    if (
+        key == "expression"
+        and quaternion_start is not None
+        and quaternion_start <= entry < quaternion_start + 4
+    ):
         return (
             f"{name.text!r} is an entry of a quaternion, not an angle; use universal or "
             "gimbal hinges, or couple speeds"
@@ -104,67 +117,84 @@ def _no_entry(hinge: Hinge, name: Name, key: str) -> str | None:
 # --- rows -----------------------------------------------------------------------------------------
 
 
-def _no_row(scene: SceneTables, coupling: Coupling) -> Iterator[str | None]:
+def _row_messages(scene: SceneTables, coupling: Coupling) -> Iterator[str | None]:
     """Reasons why an expression of existing coordinates and speeds gives no constraint row."""
     row, names = coupling.row, coupling.names
-    kept = [name for name in names if coupling.expression is not None or name.quantity == "u"]
-    switch = switching(row, {name.text for name in names})
-    if switch:
-        yield f"no derivative where {switch!r} switches; use a smooth expression"
+    coupled_names = [
+        name for name in names if coupling.expression is not None or name.quantity == "u"
+    ]
+    switch_text = switching_term(row, {name.text for name in names})
+    if switch_text:
+        yield f"no derivative where {switch_text!r} switches; use a smooth expression"
         return
-    if not kept:
-        yield f"{found(row.text)} has no speed, as in cart.u; use expression in place of speeds"
+    if not coupled_names:
+        yield (
+            f"{describe_value(row.text)} has no speed, as in cart.u; use expression in place of "
+            f"speeds"
+        )
         return
-    ways, rest = parted(row, kept)
-    idle = [name.text for name, way in zip(kept, ways, strict=True) if way is None]
-    if idle:
-        yield f"{idle[0]!r} has no effect; leave it out"
-    if coupling.speeds is not None and any(set(way or ()) & set(kept) for way in ways):
+    dependencies, has_remainder = dependency_parts(row, coupled_names)
+    ineffective_names = [
+        name.text
+        for name, dependency in zip(coupled_names, dependencies, strict=True)
+        if dependency is None
+    ]
+    if ineffective_names:
+        yield f"{ineffective_names[0]!r} has no effect; leave it out"
+    if coupling.speeds is not None and any(
+        set(dependency or ()) & set(coupled_names) for dependency in dependencies
+    ):
         yield "not linear in the speeds; write a sum of speeds with factors that contain none"
-    elif coupling.speeds is not None and rest:
+    elif coupling.speeds is not None and has_remainder:
         yield "a term has no speed; move it to equals"
     else:
-        yield _no_slope(scene, row, kept)
-        yield _all_driven(scene, kept)
+        yield _derivative_message(scene, row, coupled_names)
+        yield _all_driven_message(scene, coupled_names)
 
 
-def _no_slope(scene: SceneTables, row: Expression, kept: Collection[Name]) -> str | None:
+def _derivative_message(scene: SceneTables, row: Expression, kept: Collection[Name]) -> str | None:
     """Message about a row that is not finite or has no derivatives at the start."""
-    known = {name: _start(scene, name) for name in row.names}
-    found = slopes(row, known.__getitem__)
-    at = ", ".join(f"{name.text} = {known[name]:g}" for name in row.names[:4])
-    if not all(map(math.isfinite, (row.evaluate(known.__getitem__), *found.values()))):
+    start_values = {name: _start_value(scene, name) for name in row.names}
+    derivatives = expression_derivatives(row, start_values.__getitem__)
+    start_text = ", ".join(f"{name.text} = {start_values[name]:g}" for name in row.names[:4])
+    if not all(map(math.isfinite, (row.evaluate(start_values.__getitem__), *derivatives.values()))):
         return (
-            f"the expression or one of its derivatives is not finite at the start ({at}); use "
+            f"the expression or one of its derivatives is not finite at the start ({start_text}); "
+            f"use "
             "another initial state"
         )
-    if not any(found[name] for name in kept):
+    if not any(derivatives[name] for name in kept):
         return (
-            f"all derivatives are 0 at the start ({at}), so the direction of motion is undefined; "
+            f"all derivatives are 0 at the start ({start_text}), so the direction of motion is "
+            f"undefined; "
             "use another initial state, or an expression without the square"
         )
     return None
 
 
-def _start(scene: SceneTables, name: Name) -> float:
-    number, kind, entry = coordinate(scene, name)
+def _start_value(scene: SceneTables, name: Name) -> float:
+    number, quantity, entry = resolve_coordinate(scene, name)
     hinge = scene.hinges[number]
     drive = (hinge.drive or ())[entry : entry + 1]
     if hinge.initial is None and drive and drive[0] is not None:
         if not drive[0].depends_on_time_only:
             return 0.0
-        return motion_at(drive[0], 0.0)[0 if kind == "q" else 1]
-    given = hinge.initial and (hinge.initial.q if kind == "q" else hinge.initial.u)
-    return given[entry] if given and entry < len(given) else 0.0
+        return motion_at(drive[0], 0.0)[0 if quantity == "q" else 1]
+    initial_values = hinge.initial and (hinge.initial.q if quantity == "q" else hinge.initial.u)
+    return initial_values[entry] if initial_values and entry < len(initial_values) else 0.0
 
 
-def _all_driven(scene: SceneTables, names: list[Name]) -> str | None:
+def _all_driven_message(scene: SceneTables, names: list[Name]) -> str | None:
     """Message about a coupling of driven coordinates only; released hinges are not driven."""
-    let_go = {event.hinge for event in scene.event}
+    released_hinges = {event.hinge for event in scene.event}
     for name in names:
-        number, _, entry = coordinate(scene, name)
+        number, _, entry = resolve_coordinate(scene, name)
         hinge = scene.hinges[number]
-        if hinge.lets_go or hinge.name in let_go or not any((hinge.drive or ())[entry : entry + 1]):
+        if (
+            hinge.lets_go
+            or hinge.name in released_hinges
+            or not any((hinge.drive or ())[entry : entry + 1])
+        ):
             return None
-    which = " and ".join(dict.fromkeys(name.text for name in names))
-    return f"drives already prescribe {which}; leave out one drive or the coupling"
+    names_text = " and ".join(dict.fromkeys(name.text for name in names))
+    return f"drives already prescribe {names_text}; leave out one drive or the coupling"

@@ -12,20 +12,20 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from ...graph.mechanism import GROUND
-from ...graph.plan import Plan, planned
-from ..rules.messages import Problem, report
-from ..rules.values import split
-from . import tree
-from .joints import Joints
+from ...graph.closure_plan import ClosurePlan, closure_plan
+from ...graph.mechanism_graph import GROUND
+from ..validators.scalars_and_vectors import split_reference
+from ..validators.validation_messages import Problem, build_scene_error
+from . import tree_messages
+from .connectivity import ConnectivityGraph
 
 if TYPE_CHECKING:
-    from ..tables.all import SceneTables
     from ..tables.hinge import Hinge
+    from ..tables.scene_tables import SceneTables
 
 
 @dataclass(frozen=True, slots=True)
-class Link:
+class TreeBody:
     """Body at its position in the tree.
 
     `body` and `hinge` are indices into `bodies` and `hinges` of the scene; `parent` and `children`
@@ -43,7 +43,7 @@ class Link:
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class BodyRow:
     """Row of `count` bodies, each the child of the one before: a single body, or a chain.
 
     `body`, `hinge` and `place` are those of the first body; the others follow it.  The first is
@@ -75,8 +75,8 @@ class Topology:
     one to that body: they share its position, and their hinge has none.
     """
 
-    runs: tuple[Run, ...]
-    plan: Plan | None = None
+    runs: tuple[BodyRow, ...]
+    plan: ClosurePlan | None = None
     carried: Mapping[int, int] = field(default_factory=dict)
 
     @property
@@ -90,15 +90,15 @@ class Topology:
         return self.runs[-1].place + self.runs[-1].count if self.runs else 0
 
     @cached_property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> tuple[TreeBody, ...]:
         """All bodies in tree order."""
         parents = self.parents
         children: list[list[int]] = [[] for _ in parents]
-        for place, parent in enumerate(parents):
+        for position, parent in enumerate(parents):
             if parent != GROUND:
-                children[parent].append(place)
+                children[parent].append(position)
         return tuple(
-            Link(
+            TreeBody(
                 run.body + k, run.hinge + k, parents[run.place + k],
                 run.inboard_end if k == 0 else run.ends[(k - 1) % len(run.ends)],
                 run.outboard_end, tuple(children[run.place + k]),
@@ -127,12 +127,12 @@ class Topology:
         return tuple(map(self.place_of_body, range(self.count + len(self.carried))))
 
     @cached_property
-    def _by_body(self) -> tuple[list[int], list[Run]]:
+    def _by_body(self) -> tuple[list[int], list[BodyRow]]:
         runs = sorted(self.runs, key=lambda run: run.body)
         return [run.body for run in runs], runs
 
     @cached_property
-    def _by_hinge(self) -> tuple[list[int], list[Run]]:
+    def _by_hinge(self) -> tuple[list[int], list[BodyRow]]:
         runs = sorted(self.runs, key=lambda run: run.hinge)
         return [run.hinge for run in runs], runs
 
@@ -170,58 +170,64 @@ class Topology:
         return tuple(run.place for run in self.runs if run.parent == GROUND)
 
 
-def build(scene: SceneTables) -> Topology:
+def build_topology(scene: SceneTables) -> Topology:
     """Build the spanning tree of a scene: O(tables) without loops, no recursion.
 
     Raises SceneError, one line per problem, for hinges in the wrong direction, cut keys that leave
     no tree, and bodies that no hinge connects to the ground.
     """
-    joints = Joints(scene)
-    found = _tree(joints)
-    if found is None:
+    joints = ConnectivityGraph(scene)
+    topology = _build_if_tree(joints)
+    if topology is None:
         tables = {"body": scene.body, "hinge": scene.hinge, "chain": scene.chain}
-        raise report(list(tree.problems(joints)), tables, "scene")
-    return found
+        raise build_scene_error(list(tree_messages.problems(joints)), tables, "scene")
+    return topology
 
 
-def holders(scene: SceneTables) -> dict[str, Hinge]:
+def inboard_hinges_by_body(scene: SceneTables) -> dict[str, Hinge]:
     """Inboard hinge in the tree by body name, of a scene that has a tree."""
     skeleton = scene.skeleton
     loops = len(skeleton.hinge) > len(skeleton.body)  # every body has at least one
-    cut = set(build(skeleton).cut) if loops else set()
-    return {h.outboard_body: h for number, h in enumerate(scene.hinge) if number not in cut}
+    cut = set(build_topology(skeleton).cut) if loops else set()
+    return {
+        hinge.outboard_body: hinge for number, hinge in enumerate(scene.hinge) if number not in cut
+    }
 
 
 def problems(scene: SceneTables) -> Iterator[Problem]:
     """Locations and messages of all reasons why there is no spanning tree."""
-    yield from tree.problems(Joints(scene))
+    yield from tree_messages.problems(ConnectivityGraph(scene))
 
 
-def _tree(joints: Joints) -> Topology | None:
+def _build_if_tree(joints: ConnectivityGraph) -> Topology | None:
     """Topology of a scene, or None where there is no tree."""
     scene, plan = joints.scene, None
-    held = _only(joints)
-    if held is None or scene.constraint or scene.coupling:
-        if next(tree.problems(joints), None) is not None:
+    inboard_edges = _unique_inboard_edges(joints)
+    if inboard_edges is None or scene.constraint or scene.coupling:
+        if next(tree_messages.problems(joints), None) is not None:
             return None
-        plan = planned(joints.by_bodies())
+        plan = closure_plan(joints.by_bodies())
         chains = range(len(scene.hinge), len(joints.outboard))
-        held = [*plan.tree[: len(scene.body)], *chains]
-    runs = _runs(joints, held)
-    covered = sum(run.count for run in runs) == len(scene.bodies)
-    return Topology(runs, plan) if covered else None
+        inboard_edges = [*plan.tree[: len(scene.body)], *chains]
+    runs = _body_rows(joints, inboard_edges)
+    is_complete = sum(run.count for run in runs) == len(scene.bodies)
+    return Topology(runs, plan) if is_complete else None
 
 
-def _only(joints: Joints) -> list[int] | None:
+def _unique_inboard_edges(joints: ConnectivityGraph) -> list[int] | None:
     """Inboard edge of each node; None where a node has none or several, or an edge is cut."""
-    held = [-1] * joints.nodes
+    inboard_edges = [-1] * joints.nodes
     for edge, node in enumerate(joints.outboard):
-        held[node] = edge
-    cut = any(hinge.cut for hinge in joints.scene.hinge)
-    return None if cut or -1 in held or len(joints.outboard) > joints.nodes else held
+        inboard_edges[node] = edge
+    has_cut = any(hinge.cut for hinge in joints.scene.hinge)
+    return (
+        None
+        if has_cut or -1 in inboard_edges or len(joints.outboard) > joints.nodes
+        else inboard_edges
+    )
 
 
-def _runs(joints: Joints, held: Sequence[int]) -> tuple[Run, ...]:
+def _body_rows(joints: ConnectivityGraph, held: Sequence[int]) -> tuple[BodyRow, ...]:
     """Rows of bodies of the tree in which `held` is the inboard edge of each node."""
     # For each node (last: the ground) its children, as (member they are connected to, child).
     children: list[list[tuple[int, int]]] = [[] for _ in range(joints.nodes + 1)]
@@ -231,28 +237,30 @@ def _runs(joints: Joints, held: Sequence[int]) -> tuple[Run, ...]:
     for siblings in children:
         # Popped from the end: children of the outermost member of a chain come first.
         siblings.sort(key=lambda one: (one[0], -one[1]))
-    runs: list[Run] = []
-    first = [0] * (joints.nodes + 1)
-    places = 0
+    runs: list[BodyRow] = []
+    first_positions = [0] * (joints.nodes + 1)
+    next_position = 0
     stack = [child for _, child in children[GROUND]]
     while stack:
         node = stack.pop()
         parent, member = holder_of[node]
-        at = GROUND if parent == GROUND else first[parent] + member
-        runs.append(_run(joints, node, held[node], places, at))
-        first[node] = places
-        places += runs[-1].count
+        parent_position = GROUND if parent == GROUND else first_positions[parent] + member
+        runs.append(_body_row(joints, node, held[node], next_position, parent_position))
+        first_positions[node] = next_position
+        next_position += runs[-1].count
         stack.extend(child for _, child in children[node])
     return tuple(runs)
 
 
-def _run(joints: Joints, node: int, edge: int, place: int, parent: int) -> Run:
+def _body_row(joints: ConnectivityGraph, node: int, edge: int, place: int, parent: int) -> BodyRow:
     scene = joints.scene
-    inboard_end, on = split(joints.inboard[edge])[1], joints.body(edge)
+    inboard_end, inboard_body = split_reference(joints.inboard[edge])[1], joints.body(edge)
     bodies, hinges = len(scene.body), len(scene.hinge)
     if node < bodies:
         outboard_end = scene.hinge[edge].outboard_end
-        return Run(node, edge, 1, place, parent, on, inboard_end, outboard_end)
+        return BodyRow(node, edge, 1, place, parent, inboard_body, inboard_end, outboard_end)
     chain = scene.chain[node - bodies]
     body, hinge = scene.bodies.starts[node - bodies], scene.hinges.starts[edge - hinges]
-    return Run(body, hinge, chain.count, place, parent, on, inboard_end, "", chain.held_ends)
+    return BodyRow(
+        body, hinge, chain.count, place, parent, inboard_body, inboard_end, "", chain.held_ends
+    )

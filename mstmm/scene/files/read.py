@@ -12,34 +12,35 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import SceneError
-from ..rules.messages import near
+from ..validators.validation_messages import did_you_mean
 
 #: Largest file in MB by suffix: read and validated within about half a minute.
-MAX_SIZE = {".toml": 8, ".json": 64}
-_IN_PYTHON = "; build large scenes in Python, or use [[chain]] for repeated bodies"
+MAX_FILE_SIZE_MB = {".toml": 8, ".json": 64}
+_BUILD_IN_PYTHON = "; build large scenes in Python, or use [[chain]] for repeated bodies"
 #: Remedy for a file that is too large, by suffix.
-_LARGER = {
-    ".toml": f"{_IN_PYTHON}, or write JSON, up to {MAX_SIZE['.json']} MB", ".json": _IN_PYTHON,
-}  # fmt: skip
+_SIZE_REMEDIES = {
+    ".toml": f"{_BUILD_IN_PYTHON}, or write JSON, up to {MAX_FILE_SIZE_MB['.json']} MB",
+    ".json": _BUILD_IN_PYTHON,
+}
 #: Most parts of a dotted key: tables nest four deep, and the cost of a key grows quadratically.
-MAX_PARTS = 64
+MAX_KEY_PARTS = 64
 _LONG_KEY = re.compile(
-    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_PARTS},}}+"""
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_KEY_PARTS},}}+"""
 )
 
 
-def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
+def read_tables(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any]]:
     """Read the tables of a scene file without validation: (path for messages, tables).
 
     Raises SceneError.
     """
-    where, content = content_of(path, MAX_SIZE, "a scene file")
-    text = _text(content, where)
-    data = _json(text, where) if _ending(path) == ".json" else _toml(text, where)
+    where, content = read_content(path, MAX_FILE_SIZE_MB, "a scene file")
+    text = _decode_text(content, where)
+    data = _parse_json(text, where) if _suffix(path) == ".json" else _parse_toml(text, where)
     return where, data
 
 
-def content_of(
+def read_content(
     path: str | os.PathLike[str], limits: Mapping[str, int], what: str
 ) -> tuple[str, bytes]:
     """Read a file: (path for messages, bytes).
@@ -47,22 +48,22 @@ def content_of(
     `limits` maps accepted suffixes to the largest file size in MB.  Raises SceneError.
     """
     try:
-        shown = os.fsdecode(os.fspath(path))
+        shown_path = os.fsdecode(os.fspath(path))
     except TypeError:
         raise SceneError(f"expected the path of {what}, found {path!r:.60}") from None
-    where = shown if shown.isprintable() else ascii(shown)
-    if _ending(shown) not in limits:
+    where = shown_path if shown_path.isprintable() else ascii(shown_path)
+    if _suffix(shown_path) not in limits:
         raise SceneError(
             f"{where}: expected {what} ending in {' or '.join(limits)}; rename it if it is one"
         )
-    return where, _content(Path(shown), where, limits)
+    return where, _read_bytes(Path(shown_path), where, limits)
 
 
-def _ending(path: str | os.PathLike[str]) -> str:
+def _suffix(path: str | os.PathLike[str]) -> str:
     return Path(os.fsdecode(path)).suffix.lower()
 
 
-def _text(content: bytes, where: str) -> str:
+def _decode_text(content: bytes, where: str) -> str:
     if not content.strip():
         raise SceneError(f"{where}: the file is empty; begin with gravity = [0, -9.81, 0]")
     if b"\0" in content:
@@ -76,50 +77,53 @@ def _text(content: bytes, where: str) -> str:
         ) from None
 
 
-def _content(path: Path, where: str, limits: Mapping[str, int]) -> bytes:
+def _read_bytes(path: Path, where: str, limits: Mapping[str, int]) -> bytes:
     try:
         status = path.stat()
         if stat.S_ISDIR(status.st_mode):
             raise SceneError(f"{where}: this is a folder; give the path of a file in it")
         if not stat.S_ISREG(status.st_mode):
             raise SceneError(f"{where}: this is not a regular file; give the path of one")
-        ending = path.suffix.lower()
-        limit = limits[ending]
+        suffix = path.suffix.lower()
+        limit = limits[suffix]
         if status.st_size > limit * 2**20:
             raise SceneError(
                 f"{where}: the file has {status.st_size / 2**20:.0f} MB, the limit is {limit} MB"
-                + _LARGER.get(ending, "")
+                + _SIZE_REMEDIES.get(suffix, "")
             )
         with path.open("rb") as file:
             return file.read(limit * 2**20 + 1)
     except FileNotFoundError:
-        raise SceneError(f"{where}: there is no such file{_neighbour(path, limits)}") from None
+        raise SceneError(
+            f"{where}: there is no such file{_similar_file_hint(path, limits)}"
+        ) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SceneError(f"{where}: cannot be read: {reason}") from None
 
 
-def _neighbour(path: Path, endings: Collection[str]) -> str:
+def _similar_file_hint(path: Path, endings: Collection[str]) -> str:
     """Suggestion of a file with a similar name in the same folder."""
     try:
         names = [p.name for p in path.parent.iterdir() if p.suffix.lower() in endings]
     except OSError:
         return "; check the folder"
-    hint = near(path.name, names)
+    hint = did_you_mean(path.name, names)
     return hint if "did you mean" in hint else "; check the path"
 
 
-def _toml(text: str, where: str) -> dict[str, Any]:
-    if long := _LONG_KEY.search(text):
+def _parse_toml(text: str, where: str) -> dict[str, Any]:
+    if long_key := _LONG_KEY.search(text):
         raise SceneError(
-            f"{where}: line {text.count(chr(10), 0, long.start()) + 1}: a key has more than "
-            f"{MAX_PARTS} parts, {long.group()[:20]}...; tables of a scene nest four deep at most"
+            f"{where}: line {text.count(chr(10), 0, long_key.start()) + 1}: a key has more than "
+            f"{MAX_KEY_PARTS} parts, {long_key.group()[:20]}...; tables of a scene nest four deep "
+            f"at most"
         )
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        once = "Cannot overwrite a value" in str(error)
-        hint = "; repeated tables need two brackets, as in [[hinge]]" if once else ""
+        is_redefinition = "Cannot overwrite a value" in str(error)
+        hint = "; repeated tables need two brackets, as in [[hinge]]" if is_redefinition else ""
         raise SceneError(f"{where}: not valid TOML: {error}{hint}") from None
     except RecursionError:
         raise SceneError(f"{where}: lists or tables are nested too deeply") from None
@@ -127,8 +131,8 @@ def _toml(text: str, where: str) -> dict[str, Any]:
         raise SceneError(f"{where}: not valid TOML: {error}") from None
 
 
-def _json(text: str, where: str) -> dict[str, Any]:
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _parse_json(text: str, where: str) -> dict[str, Any]:
+    def unique_table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         table: dict[str, Any] = {}
         for key, value in pairs:
             if key in table:
@@ -137,7 +141,7 @@ def _json(text: str, where: str) -> dict[str, Any]:
         return table
 
     try:
-        data = json.loads(text, object_pairs_hook=unique, parse_constant=float)
+        data = json.loads(text, object_pairs_hook=unique_table, parse_constant=float)
     except json.JSONDecodeError as error:
         raise SceneError(f"{where}: not valid JSON: {error}") from None
     except RecursionError:

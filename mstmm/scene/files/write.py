@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ...ir.facts import builtin_hinges
-from ..rules.messages import TABLES
-from ..rules.units import is_number
-from ..rules.written import Written
+from ...ir.hinge_properties import builtin_hinges
+from ..validators.constant_expressions import WrittenNumber
+from ..validators.unit_suffixes import is_number
+from ..validators.validation_messages import TABLES
 
 if TYPE_CHECKING:
-    from ..tables.all import SceneTables
+    from ..tables.scene_tables import SceneTables
 
 #: The table of name tables, whose keys are written in quotes.
-_NAMES = "names"
+_NAMES_KEY = "names"
 
 
 def to_toml(scene: SceneTables, evaluated: bool = False) -> str:
@@ -33,50 +33,55 @@ def to_toml(scene: SceneTables, evaluated: bool = False) -> str:
 def as_toml(data: Mapping[str, Any], evaluated: bool = False) -> str:
     """Convert the keys of a scene to TOML text, without keys that have no value."""
     lines = [
-        f"{key} = {_value(value, evaluated)}"
+        f"{key} = {_toml_value(value, evaluated)}"
         for key, value in data.items()
-        if key not in (*TABLES, _NAMES) and value not in (None, {}, ())
+        if key not in (*TABLES, _NAMES_KEY) and value not in (None, {}, ())
     ]
     for table in TABLES:
         for element in data.get(table, ()):
-            named = {"name": element["name"], **element} if "name" in element else element
+            ordered_element = {"name": element["name"], **element} if "name" in element else element
             lines += ["", f"[[{table}]]"]
             lines += [
-                f"{key} = {_value(value, evaluated)}"
-                for key, value in named.items() if value is not None and value != {}
+                f"{key} = {_toml_value(value, evaluated)}"
+                for key, value in ordered_element.items() if value is not None and value != {}
             ]  # fmt: skip
-    for table, known in data.get(_NAMES, {}).items():
-        if known:
-            lines += ["", f"[{_NAMES}.{table}]"]
-            lines += [f"{_string(name)} = {_string(one)}" for name, one in known.items()]
+    for table, name_table in data.get(_NAMES_KEY, {}).items():
+        if name_table:
+            lines += ["", f"[{_NAMES_KEY}.{table}]"]
+            lines += [
+                f"{_toml_string(name)} = {_toml_string(scene_name)}"
+                for name, scene_name in name_table.items()
+            ]
     return "\n".join(lines) + "\n"
 
 
-def _value(value: Any, evaluated: bool) -> str:
+def _toml_value(value: Any, evaluated: bool) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, Written):
+    if isinstance(value, WrittenNumber):
         if evaluated:
             return repr(float(value))
-        return value.text if is_number(value.text) else _string(value.text)
+        return value.text if is_number(value.text) else _toml_string(value.text)
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, int):
         return str(value)
     if isinstance(value, str):
-        return _string(value)
+        return _toml_string(value)
     if isinstance(value, dict):
-        inside = ", ".join(f"{k} = {_value(v, evaluated)}" for k, v in value.items() if _is_said(v))
-        return "{ " + inside + " }" if inside else "{}"
-    return "[" + ", ".join(_value(v, evaluated) for v in value) + "]"
+        entries_text = ", ".join(
+            f"{k} = {_toml_value(v, evaluated)}" for k, v in value.items() if _is_written(v)
+        )
+        return "{ " + entries_text + " }" if entries_text else "{}"
+    return "[" + ", ".join(_toml_value(v, evaluated) for v in value) + "]"
 
 
-def _is_said(value: Any) -> bool:
+def _is_written(value: Any) -> bool:
     """Whether a value is written: TOML has no null, and an empty list is always the default."""
     return value is not None and value != ()
 
 
-def _string(text: str) -> str:
+def _toml_string(text: str) -> str:
     """Text as a basic string of TOML."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\u{ord(c):04x}" for c in escaped) + '"'

@@ -11,51 +11,41 @@ from collections.abc import Iterator
 from typing import Any
 
 from ...errors import SceneError
-from ...extras import missing
-from ...numbers.pose import IN_PLACE, ZERO, Pose
-from ...numbers.rotations import (
+from ...numerics.pose import IDENTITY_POSE, ZERO, Pose
+from ...numerics.rotations import (
     Matrix,
     Vector,
-    about,
     from_quaternion,
     product,
+    rotation_about,
     transpose,
 )
-from .mjcf_files import Places
-from .robot import (
-    FIXED,
-    NOTHING,
-    Joint,
-    Link,
-    Look,
-    Mimic,
-    Note,
-    Robot,
-    color,
-)
+from ...optional_packages import missing_package_error
+from .mjcf_includes import Locations
+from .robot_model import FIXED, NOTHING, ImportNote, Joint, Link, Mimic, Robot, Visual, color
 
 _FREE, _BALL, _SLIDE = 0, 1, 2
 _HINGES = ("free", "ball", "prismatic", "pin")
 #: Dynamic parts of a model that are left out, by the name of their count.
-_LEFT = {
+_COUNTED_UNSUPPORTED = {
     "nu": "actuators", "nsensor": "sensors", "nplugin": "plugins", "nflex": "flexible parts",
     "nkey": "keyframes",
 }  # fmt: skip
 #: Parts that are left out one by one: their count, and their section of the file.
-_NAMED = {
+_NAMED_UNSUPPORTED = {
     "tendon": ("ntendon", "tendon"), "pair": ("npair", "contact"),
     "exclude": ("nexclude", "contact"),
 }  # fmt: skip
 _JOINT_EQUALITY = 2
 #: Flags that are also switched off by "constraint".
-_CONSTRAINTS = ("limit", "frictionloss", "equality")
+_CONSTRAINT_FLAGS = ("limit", "frictionloss", "equality")
 #: Most characters quoted from a message of MuJoCo.
-_LONGEST = 400
+_MAX_QUOTED_LENGTH = 400
 #: Number of geom groups that are drawn.
-_SEEN = 3
+_DRAWN_GROUP_COUNT = 3
 
 
-def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
+def read_mjcf(path: str, where: str, places: Locations | None = None) -> Robot:
     """Read a robot from an MJCF file.
 
     `where` is the name of the file in messages, `places` the locations of named elements.  Raises
@@ -64,24 +54,28 @@ def read_mjcf(path: str, where: str, places: Places | None = None) -> Robot:
     try:
         import mujoco
     except ImportError as error:
-        raise missing("robot", f"{where}: MJCF", error) from None
+        raise missing_package_error("robot", f"{where}: MJCF", error) from None
     try:
         model = mujoco.MjModel.from_xml_path(path)
     except (ValueError, OSError, RuntimeError, MemoryError) as error:
-        why = " ".join(str(error).split())
-        why = why if len(why) <= _LONGEST else f"{why[:_LONGEST]}..."
-        raise SceneError(f"{where}: MuJoCo cannot read the file: {why}") from None
-    return _Reader(mujoco, model, where, places or {}).robot()
+        error_text = " ".join(str(error).split())
+        error_text = (
+            error_text
+            if len(error_text) <= _MAX_QUOTED_LENGTH
+            else f"{error_text[:_MAX_QUOTED_LENGTH]}..."
+        )
+        raise SceneError(f"{where}: MuJoCo cannot read the file: {error_text}") from None
+    return _MjcfReader(mujoco, model, where, places or {}).robot()
 
 
-class _Reader:
+class _MjcfReader:
     """Reader of a compiled MuJoCo model."""
 
-    def __init__(self, mujoco: Any, model: Any, where: str, places: Places) -> None:
+    def __init__(self, mujoco: Any, model: Any, where: str, places: Locations) -> None:
         self._mujoco, self._m, self._where, self._places = mujoco, model, where, places
-        self._notes = list[Note]()
+        self._notes = list[ImportNote]()
         #: Body -> pose of its frame in its link.
-        self._frame = {0: IN_PLACE}
+        self._frame = {0: IDENTITY_POSE}
 
     def robot(self) -> Robot:
         """Read the robot of the model."""
@@ -91,31 +85,31 @@ class _Reader:
                 links.append(link)
                 joints.append(joint)
         mimics = tuple(self._mimics())
-        looks = tuple(self._looks())
+        visuals = tuple(self._looks())
         self._leave_out()
         return Robot(
-            "", self._where, tuple(links), tuple(joints), mimics, looks, tuple(self._notes),
+            "", self._where, tuple(links), tuple(joints), mimics, visuals, tuple(self._notes),
             ZERO if self._off("gravity") else _vector(self._m.opt.gravity),
         )  # fmt: skip
 
     def _off(self, what: str) -> bool:
         """Whether a <flag> of the file switches a feature off."""
-        flags = (what, "constraint") if what in _CONSTRAINTS else (what,)
+        flags = (what, "constraint") if what in _CONSTRAINT_FLAGS else (what,)
         bits = (getattr(self._mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}") for flag in flags)
         return any(self._m.opt.disableflags & int(bit) for bit in bits)
 
     def _tell(self, element: str, text: str, where: str = "") -> None:
-        self._notes.append(Note(where or self._where, element, text))
+        self._notes.append(ImportNote(where or self._where, element, text))
 
     def _at(self, tag: str, name: str, other: str = "") -> str:
         """File and line of a named element with one of two tags; else the file."""
         return self._places.get((tag, name)) or self._places.get((other, name), self._where)
 
     def _name(self, kind: str, number: int) -> str:
-        found = self._mujoco.mj_id2name(
+        element_name = self._mujoco.mj_id2name(
             self._m, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), number
         )
-        return found or f"{kind}{number}"
+        return element_name or f"{kind}{number}"
 
     def _link_of(self, body: int) -> str:
         return "world" if body == 0 else self._name("body", body)
@@ -123,39 +117,50 @@ class _Reader:
     def _body(self, body: int) -> Iterator[tuple[Link, Joint]]:
         """Links of a body with their inboard joints, from inboard to outboard."""
         m, name = self._m, self._link_of(body)
-        first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
+        first_joint, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
         parent = int(m.body_parentid[body])
         holder = self._link_of(parent)
-        at = Pose(_vector(m.body_pos[body]), _turn(m.body_quat[body]))
-        pose, anchor = self._frame[parent].then(at), ZERO
+        body_pose = Pose(_vector(m.body_pos[body]), _rotation(m.body_quat[body]))
+        pose, previous_anchor = self._frame[parent].then(body_pose), ZERO
         if count == 0:
-            self._frame[body] = IN_PLACE
-            weld = Joint(f"{name}/weld", FIXED, holder, name, pose, where=self._at("body", name))
-            yield self._mass(body, name), weld
+            self._frame[body] = IDENTITY_POSE
+            weld_joint = Joint(
+                f"{name}/weld", FIXED, holder, name, pose, where=self._at("body", name)
+            )
+            yield self._mass(body, name), weld_joint
             return
         if count > 1:
-            what = f"its {count} joints are hinges in series, with massless bodies between them"
-            self._tell(f"body {name!r}", what, self._at("body", name))
-        for number in range(first, first + count):
-            kind, last = int(m.jnt_type[number]), number == first + count - 1
-            place = ZERO if kind == _FREE else _vector(m.jnt_pos[number])
-            moved = IN_PLACE if kind == _FREE else pose.then(Pose(_minus(place, anchor)))
+            note_text = (
+                f"its {count} joints are hinges in series, with massless bodies between them"
+            )
+            self._tell(f"body {name!r}", note_text, self._at("body", name))
+        for number in range(first_joint, first_joint + count):
+            joint_type, is_last = int(m.jnt_type[number]), number == first_joint + count - 1
+            joint_anchor = ZERO if joint_type == _FREE else _vector(m.jnt_pos[number])
+            joint_pose = (
+                IDENTITY_POSE
+                if joint_type == _FREE
+                else pose.then(Pose(_subtract(joint_anchor, previous_anchor)))
+            )
             joint = self._name("joint", number)
-            held = name if last else f"{name}/{joint}"
-            moved = moved.then(self._back(number, kind))
-            if last:
-                self._frame[body] = Pose(_minus(ZERO, place))
+            link_name = name if is_last else f"{name}/{joint}"
+            joint_pose = joint_pose.then(self._back(number, joint_type))
+            if is_last:
+                self._frame[body] = Pose(_subtract(ZERO, joint_anchor))
             where = self._at("joint", joint, "freejoint")
-            link = self._mass(body, held) if last else Link(held, where=where)
-            keys = self._keys(number, kind, joint, where)
-            yield link, Joint(joint, _HINGES[kind], holder, held, moved, keys, where)
-            holder, pose, anchor = held, IN_PLACE, place
-        if any(anchor):
+            link = self._mass(body, link_name) if is_last else Link(link_name, where=where)
+            keys = self._keys(number, joint_type, joint, where)
+            yield (
+                link,
+                Joint(joint, _HINGES[joint_type], holder, link_name, joint_pose, keys, where),
+            )
+            holder, pose, previous_anchor = link_name, IDENTITY_POSE, joint_anchor
+        if any(previous_anchor):
             frame, at_body = f"{name}/frame", self._at("body", name)
-            what = "its origin is at its joint; its original frame is an end"
-            self._tell(f"body {name!r}", what, at_body)
-            weld = Joint(frame, FIXED, name, frame, self._frame[body], where=at_body)
-            yield Link(frame, where=at_body), weld
+            note_text = "its origin is at its joint; its original frame is an end"
+            self._tell(f"body {name!r}", note_text, at_body)
+            weld_joint = Joint(frame, FIXED, name, frame, self._frame[body], where=at_body)
+            yield Link(frame, where=at_body), weld_joint
 
     def _mass(self, body: int, name: str) -> Link:
         """Link with the mass of a body, in the frame of the link."""
@@ -164,7 +169,7 @@ class _Reader:
         where = self._at("body", name)
         if mass == 0 and not m.body_inertia[body].any():
             return Link(name, where=where)
-        turn = _turn(m.body_iquat[body])
+        turn = _rotation(m.body_iquat[body])
         a, b, c = map(float, m.body_inertia[body])
         principal: Matrix = ((a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c))
         inertia = product(product(turn, principal), transpose(turn))
@@ -174,29 +179,33 @@ class _Reader:
     def _back(self, number: int, kind: int) -> Pose:
         """Pose of a joint at 0 relative to its reference value."""
         if kind in (_FREE, _BALL):
-            return IN_PLACE
+            return IDENTITY_POSE
         reference = float(self._m.qpos0[self._m.jnt_qposadr[number]])
         if reference == 0:
-            return IN_PLACE
+            return IDENTITY_POSE
         axis = _vector(self._m.jnt_axis[number])
         if kind == _SLIDE:
             x, y, z = axis
             return Pose((-reference * x, -reference * y, -reference * z))
-        return Pose(rotation=about(axis, -reference))
+        return Pose(rotation=rotation_about(axis, -reference))
 
     def _keys(self, number: int, kind: int, joint: str, where: str) -> dict[str, Any]:
-        m, dof, at = self._m, int(self._m.jnt_dofadr[number]), int(self._m.jnt_qposadr[number])
-        stop, values = dof + (6, 3, 1, 1)[kind], at + (7, 4, 1, 1)[kind]
+        m, dof, first_value = (
+            self._m,
+            int(self._m.jnt_dofadr[number]),
+            int(self._m.jnt_qposadr[number]),
+        )
+        dof_end, value_end = dof + (6, 3, 1, 1)[kind], first_value + (7, 4, 1, 1)[kind]
         law: dict[str, Any] = {}
         for key, numbers in (("damping", m.dof_damping), ("inertia", m.dof_armature)):
             if key == "damping" and self._off("damper"):
                 continue
-            if (found := [float(x) for x in numbers[dof:stop]]) and any(found):
-                law[key] = found
+            if (values_found := [float(x) for x in numbers[dof:dof_end]]) and any(values_found):
+                law[key] = values_found
         self._tell_of_curves(number, dof, joint, where)
-        losses = [float(x) for x in m.dof_frictionloss[dof:stop]]
-        if any(losses) and not self._off("frictionloss"):
-            law["friction"] = [{"coulomb": x} for x in losses]
+        friction_losses = [float(x) for x in m.dof_frictionloss[dof:dof_end]]
+        if any(friction_losses) and not self._off("frictionloss"):
+            law["friction"] = [{"coulomb": x} for x in friction_losses]
             if kind == _FREE:
                 text = "its friction acts along the axes of the body, in MuJoCo along world axes"
                 self._tell(f"joint {joint!r}", text, where)
@@ -205,7 +214,7 @@ class _Reader:
             text = "its spring is left out; define it in the law of the hinge"
             self._tell(f"joint {joint!r}", text, where)
         elif stiffness:
-            law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[at])}
+            law |= {"stiffness": stiffness, "rest": float(m.qpos_spring[first_value])}
         if m.jnt_limited[number] and not self._off("limit"):
             if kind == _BALL:
                 self._tell(f"joint {joint!r}", "its limit is left out", where)
@@ -220,69 +229,84 @@ class _Reader:
         if kind not in (_FREE, _BALL):
             keys["axis"] = _vector(m.jnt_axis[number])
         if m.jnt_actfrclimited[number]:
-            least, most = map(float, m.jnt_actfrcrange[number])
-            text = f"actuatorfrcrange from {least:g} to {most:g} left out"
+            lower_force, upper_force = map(float, m.jnt_actfrcrange[number])
+            text = f"actuatorfrcrange from {lower_force:g} to {upper_force:g} left out"
             self._tell(f"joint {joint!r}", text, where)
-        start = [float(x) for x in m.qpos0[at:values]]
+        start = [float(x) for x in m.qpos0[first_value:value_end]]
         return keys | ({"initial": {"q": start}} if any(start) else {})
 
     def _tell_of_curves(self, number: int, dof: int, joint: str, where: str) -> None:
         """Add notes about nonlinear terms of springs and dampers, where MuJoCo has them."""
-        for what, key, place in (
+        for feature, key, index in (
             ("spring", "jnt_stiffness", number),
             ("damper", "dof_damping", dof),
         ):
             terms = getattr(self._m, f"{key}poly", None)
-            if terms is not None and terms[place].any() and not self._off(what):
-                text = f"the nonlinear terms of its {what} are left out"
+            if terms is not None and terms[index].any() and not self._off(feature):
+                text = f"the nonlinear terms of its {feature} are left out"
                 self._tell(f"joint {joint!r}", text, where)
 
     def _mimics(self) -> Iterator[Mimic]:
         """Active joint equalities that are linear."""
-        m, off = self._m, self._off("equality")
+        m, is_disabled = self._m, self._off("equality")
         for number in range(m.neq):
-            if off or not m.eq_active0[number]:
+            if is_disabled or not m.eq_active0[number]:
                 self._leave_equality(number, "left out: switched off")
                 continue
-            line = [float(x) for x in m.eq_data[number][:5]]
-            one, other = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
-            if m.eq_type[number] != _JOINT_EQUALITY or other < 0 or any(line[2:]):
+            coefficients = [float(x) for x in m.eq_data[number][:5]]
+            first_joint, second_joint = int(m.eq_obj1id[number]), int(m.eq_obj2id[number])
+            if m.eq_type[number] != _JOINT_EQUALITY or second_joint < 0 or any(coefficients[2:]):
                 self._leave_equality(number)
                 continue
-            first, second = (float(m.qpos0[m.jnt_qposadr[each]]) for each in (one, other))
-            offset = first + line[0] - line[1] * second
-            yield Mimic(self._name("joint", one), self._name("joint", other), line[1], offset)
+            first_value, second_value = (
+                float(m.qpos0[m.jnt_qposadr[joint_number]])
+                for joint_number in (first_joint, second_joint)
+            )
+            offset = first_value + coefficients[0] - coefficients[1] * second_value
+            yield Mimic(
+                self._name("joint", first_joint),
+                self._name("joint", second_joint),
+                coefficients[1],
+                offset,
+            )
 
     def _leave_equality(self, number: int, what: str = "left out") -> None:
-        name, kinds = self._name("equality", number), self._mujoco.mjtEq
-        kind = kinds(int(self._m.eq_type[number])).name.removeprefix("mjEQ_").lower()
-        self._tell(f"equality {name!r} ({kind})", what, self._at("equality", name))
+        name, type_enum = self._name("equality", number), self._mujoco.mjtEq
+        type_name = type_enum(int(self._m.eq_type[number])).name.removeprefix("mjEQ_").lower()
+        self._tell(f"equality {name!r} ({type_name})", what, self._at("equality", name))
 
-    def _looks(self) -> Iterator[Look]:
-        m, kinds, unseen = self._m, self._mujoco.mjtGeom, 0
+    def _looks(self) -> Iterator[Visual]:
+        m, geom_types, undrawn_count = self._m, self._mujoco.mjtGeom, 0
         for number in range(m.ngeom):
-            if m.geom_group[number] >= _SEEN or m.geom_type[number] == kinds.mjGEOM_PLANE:
+            if (
+                m.geom_group[number] >= _DRAWN_GROUP_COUNT
+                or m.geom_type[number] == geom_types.mjGEOM_PLANE
+            ):
                 continue
-            keys = _solid(kinds, int(m.geom_type[number]), [float(x) for x in m.geom_size[number]])
+            keys = _shape_keys(
+                geom_types, int(m.geom_type[number]), [float(x) for x in m.geom_size[number]]
+            )
             if keys is None:
-                unseen += 1
+                undrawn_count += 1
                 continue
             body = int(m.geom_bodyid[number])
-            at = Pose(_vector(m.geom_pos[number]), _turn(m.geom_quat[number]))
+            geom_pose = Pose(_vector(m.geom_pos[number]), _rotation(m.geom_quat[number]))
             keys["color"] = color(m.geom_rgba[number][:3])
-            yield Look(self._link_of(body), self._frame[body].then(at), keys)
-        if unseen:
-            self._tell("geom", f"{unseen} of them are not drawn (meshes, ellipsoids, heights)")
+            yield Visual(self._link_of(body), self._frame[body].then(geom_pose), keys)
+        if undrawn_count:
+            self._tell(
+                "geom", f"{undrawn_count} of them are not drawn (meshes, ellipsoids, heights)"
+            )
 
     def _leave_out(self) -> None:
         m = self._m
-        for key, what in _LEFT.items():
+        for key, description in _COUNTED_UNSUPPORTED.items():
             if count := int(getattr(m, key, 0)):
-                self._tell(what, f"left out, {count} of them")
-        for what, (key, section) in _NAMED.items():
+                self._tell(description, f"left out, {count} of them")
+        for description, (key, section) in _NAMED_UNSUPPORTED.items():
             for number in range(int(getattr(m, key, 0))):
-                name = self._name(what, number)
-                self._tell(f"{what} {name!r}", "left out", self._at(section, name))
+                name = self._name(description, number)
+                self._tell(f"{description} {name!r}", "left out", self._at(section, name))
         if m.ngeom and (m.geom_contype.any() or m.geom_conaffinity.any()):
             self._tell("contacts", "left out: bodies pass through each other and the ground")
         if m.body_gravcomp.any():
@@ -291,7 +315,7 @@ class _Reader:
             self._tell("fluid", "fluid forces are left out")
 
 
-def _solid(kinds: Any, kind: int, size: list[float]) -> dict[str, Any] | None:
+def _shape_keys(kinds: Any, kind: int, size: list[float]) -> dict[str, Any] | None:
     """Keys of a shape; MuJoCo stores half lengths."""
     if kind == kinds.mjGEOM_SPHERE:
         return {"type": "sphere", "radius": size[0]}
@@ -308,9 +332,9 @@ def _vector(numbers: Any) -> Vector:
     return (x, y, z)
 
 
-def _turn(quaternion: Any) -> Matrix:
+def _rotation(quaternion: Any) -> Matrix:
     return from_quaternion([float(x) for x in quaternion])
 
 
-def _minus(a: Vector, b: Vector) -> Vector:
+def _subtract(a: Vector, b: Vector) -> Vector:
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])

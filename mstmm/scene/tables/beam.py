@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from ..rules.values import Refused
+from ..validators.scalars_and_vectors import ValidationProblems
 from . import beam_rules as checks
 from .beam_keys import GIVEN, ROOT, TIP, BeamKeys
 from .body import End
-from .flexible import AUTO
+from .flexible_keys import AUTO
 
 
 class Beam(BeamKeys):
@@ -28,11 +28,14 @@ class Beam(BeamKeys):
             object.__setattr__(self, "modes", self.shapes.modes)
         problems = list(checks.problems(self))
         if problems:
-            raise Refused(*problems)
-        object.__setattr__(self, "section", checks.joined(self))
+            raise ValidationProblems(*problems)
+        object.__setattr__(self, "section", checks.joined_sections(self))
         return self
 
     def _all_ends(self) -> dict[str, End]:
-        own = {ROOT: (0.0, 0.0, 0.0), TIP: (self.length, 0.0, 0.0)}
-        always = {name: End.model_construct(position=at) for name, at in own.items()}
-        return always | self.ends
+        default_positions = {ROOT: (0.0, 0.0, 0.0), TIP: (self.length, 0.0, 0.0)}
+        default_ends = {
+            name: End.model_construct(position=end_position)
+            for name, end_position in default_positions.items()
+        }
+        return default_ends | self.ends

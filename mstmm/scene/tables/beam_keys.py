@@ -7,11 +7,18 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field
 
 from ...expression.expression import Expression
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules.values import NAME, Shorthand, Table, found, plain, refuse
+from ..validators import names_and_text as texts
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import (
+    NAME_PATTERN,
+    Shorthand,
+    Table,
+    describe_value,
+    problem,
+    to_python,
+)
 from .body import End
-from .flexible import AUTO, FlexibleTable, decided, framed
+from .flexible_keys import AUTO, FlexibleTable, frame_field, or_auto
 
 GIVEN = "given"
 BASES = (AUTO, "clamped-free", "free-free", "simply-supported", "static+fixed-interface", GIVEN)
@@ -23,25 +30,27 @@ DIRECTIONS = ("y", "z", "twist", "axial")
 #: Most shapes in one direction.  For more, half-waves are too short for the theory, and products of
 #: shapes cannot be integrated accurately in double precision.
 MAX_SHAPES = 60
-SHAPES = rules.Rule(
-    "a whole number, 0 or more", lambda value: _count(value), {"type": "integer", "minimum": 0}
+SHAPE_COUNT_RULE = rules.Rule(
+    "a whole number, 0 or more",
+    lambda value: _check_count(value),
+    {"type": "integer", "minimum": 0},
 )
 
 
-def _count(value: Any) -> int:
-    value = plain(value)
+def _check_count(value: Any) -> int:
+    value = to_python(value)
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise refuse(f"expected {SHAPES.expected}, found {found(value)}")
+        raise problem(f"expected {SHAPE_COUNT_RULE.expected}, found {describe_value(value)}")
     return value
 
 
 class Modes(Table):
     """Number of shapes in each direction."""
 
-    y: Annotated[int, SHAPES] = 0
-    z: Annotated[int, SHAPES] = 0
-    twist: Annotated[int, SHAPES] = 0
-    axial: Annotated[int, SHAPES] = 0
+    y: Annotated[int, SHAPE_COUNT_RULE] = 0
+    z: Annotated[int, SHAPE_COUNT_RULE] = 0
+    twist: Annotated[int, SHAPE_COUNT_RULE] = 0
+    axial: Annotated[int, SHAPE_COUNT_RULE] = 0
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -56,28 +65,32 @@ class Modes(Table):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the modal coordinates in order: "y1", "y2", "z1", ..."""
-        counted = zip(DIRECTIONS, self.counts, strict=True)
-        return tuple(f"{word}{k}" for word, count in counted for k in range(1, count + 1))
+        counts_by_direction = zip(DIRECTIONS, self.counts, strict=True)
+        return tuple(
+            f"{direction}{k}"
+            for direction, count in counts_by_direction
+            for k in range(1, count + 1)
+        )
 
 
-def _as_modes(value: Any) -> Any:
-    value = plain(value)
+def _widen_modes(value: Any) -> Any:
+    value = to_python(value)
     if value == AUTO:
         return None
     if value is None or isinstance(value, (dict, BaseModel)):
         return value
     if isinstance(value, int) and not isinstance(value, bool):
         return {"y": value, "z": value}
-    raise refuse(f"expected {_MODES}, found {found(value)}")
+    raise problem(f"expected {_MODES_DESCRIPTION}, found {describe_value(value)}")
 
 
-_MODES = (
+_MODES_DESCRIPTION = (
     "a whole number of shapes per bending plane, a table { y, z, twist, axial } of whole "
     'numbers, or "auto"'
 )
 
 
-_MODES_RULE = Shorthand(_MODES, _as_modes, {"type": ["integer", "string"]})
+_MODES_RULE = Shorthand(_MODES_DESCRIPTION, _widen_modes, {"type": ["integer", "string"]})
 
 
 class Shapes(Table):
@@ -87,30 +100,36 @@ class Shapes(Table):
     twists in rad per rad.
     """
 
-    y: Annotated[tuple[Expression, ...], texts.expressions("a list of expressions of x")] = ()
-    z: Annotated[tuple[Expression, ...], texts.expressions("a list of expressions of x")] = ()
-    twist: Annotated[tuple[Expression, ...], texts.expressions("a list of expressions of x")] = ()
-    axial: Annotated[tuple[Expression, ...], texts.expressions("a list of expressions of x")] = ()
+    y: Annotated[tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")] = ()
+    z: Annotated[tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")] = ()
+    twist: Annotated[
+        tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")
+    ] = ()
+    axial: Annotated[
+        tuple[Expression, ...], texts.expressions_rule("a list of expressions of x")
+    ] = ()
 
     @property
     def modes(self) -> Modes:
         """Number of shapes in each direction, as `Modes`."""
-        return Modes(**{word: len(getattr(self, word)) for word in DIRECTIONS})
+        return Modes(**{direction: len(getattr(self, direction)) for direction in DIRECTIONS})
 
 
-def _pair(of: str) -> rules.Rule:
+def _pair_rule(of: str) -> rules.Rule:
     """Rule for one number for both bending planes, or one for each."""
     expected = f"a number, or two, [about y, about z], in {of}"
-    inner = rules.numbers(expected, of=of)
+    inner = rules.numbers_rule(expected, of=of)
 
     def check(value: Any) -> tuple[float, float]:
         values = inner.check(value)
         if len(values) not in (1, 2):
-            raise refuse(f"expected {expected}, found {rules.counted(len(values))}")
+            raise problem(f"expected {expected}, found {rules.count_text(len(values))}")
         for i, entry in enumerate(values):
             if entry <= 0:
-                place = (i,) if len(values) == 2 else ()
-                raise refuse(f"expected {expected}, more than 0, found {found(entry)}", *place)
+                location = (i,) if len(values) == 2 else ()
+                raise problem(
+                    f"expected {expected}, more than 0, found {describe_value(entry)}", *location
+                )
         return (values[0], values[-1])
 
     number = {"type": ["number", "string"], "exclusiveMinimum": 0}
@@ -125,35 +144,35 @@ class SectionTable(Table):
     deflection along y; `rotary_inertia` (rho I_y, rho I_z) likewise.
     """
 
-    mass_per_length: Annotated[float | None, rules.number("kg/m", above=0)] = None
-    bending_stiffness: Annotated[tuple[float, float] | None, _pair("N m^2")] = None
-    axial_stiffness: Annotated[float | None, rules.number("N", above=0)] = None
-    torsional_stiffness: Annotated[float | None, rules.number("N m^2", above=0)] = None
-    polar_inertia_per_length: Annotated[float | None, rules.number("kg m", above=0)] = None
-    rotary_inertia: Annotated[tuple[float, float] | None, _pair("kg m")] = None
+    mass_per_length: Annotated[float | None, rules.number_rule("kg/m", above=0)] = None
+    bending_stiffness: Annotated[tuple[float, float] | None, _pair_rule("N m^2")] = None
+    axial_stiffness: Annotated[float | None, rules.number_rule("N", above=0)] = None
+    torsional_stiffness: Annotated[float | None, rules.number_rule("N m^2", above=0)] = None
+    polar_inertia_per_length: Annotated[float | None, rules.number_rule("kg m", above=0)] = None
+    rotary_inertia: Annotated[tuple[float, float] | None, _pair_rule("kg m")] = None
 
 
 class Section(SectionTable):
     """Piece of a beam with a constant section, `from` one x `to` another (m)."""
 
-    from_: Annotated[float, rules.number("m", minimum=0)] = Field(alias="from")
-    to: Annotated[float, rules.number("m", above=0)]
+    from_: Annotated[float, rules.number_rule("m", minimum=0)] = Field(alias="from")
+    to: Annotated[float, rules.number_rule("m", above=0)]
 
 
-def _as_ends(value: Any) -> Any:
+def _widen_ends(value: Any) -> Any:
     if not isinstance(value, dict):
-        raise refuse(f"expected a table such as {{ mid = 5.0 }}, found {found(value)}")
+        raise problem(f"expected a table such as {{ mid = 5.0 }}, found {describe_value(value)}")
     for key in value:
-        if not isinstance(key, str) or not NAME.fullmatch(key):
-            raise refuse(f"expected the name of an end, found {found(key)}")
-    return {key: _as_end(one) for key, one in value.items()}
+        if not isinstance(key, str) or not NAME_PATTERN.fullmatch(key):
+            raise problem(f"expected the name of an end, found {describe_value(key)}")
+    return {key: _widen_end(end_value) for key, end_value in value.items()}
 
 
-def _as_end(value: Any) -> Any:
+def _widen_end(value: Any) -> Any:
     """Expand the position of an end along the beam (m) to a point in beam axes."""
-    value = plain(value)
+    value = to_python(value)
     if isinstance(value, dict):
-        position = plain(value.get("position"))
+        position = to_python(value.get("position"))
         if isinstance(position, (int, float, str)) and not isinstance(position, bool):
             return {**value, "position": [position, 0.0, 0.0]}
         return value
@@ -167,19 +186,19 @@ def _as_end(value: Any) -> Any:
 class BeamKeys(FlexibleTable, SectionTable):
     """Keys of a beam, before and after `Beam` resolves their defaults."""
 
-    length: Annotated[float, rules.number("m", above=0)]
+    length: Annotated[float, rules.number_rule("m", above=0)]
     section: tuple[Section, ...] = ()
     modes: Annotated[Modes | None, _MODES_RULE] = None
-    frame: Annotated[str, framed(AUTO, "tangent", "chord", "mean", at_end=True)] = AUTO
-    basis: Annotated[str, texts.choice(*BASES)] = AUTO
+    frame: Annotated[str, frame_field(AUTO, "tangent", "chord", "mean", at_end=True)] = AUTO
+    basis: Annotated[str, texts.choice_rule(*BASES)] = AUTO
     shapes: Shapes | None = None
-    quadrature: Annotated[bool | None, decided(texts.flag())] = None
-    viscous_drag: Annotated[float, rules.number("N s/m^2", minimum=0)] = 0.0
+    quadrature: Annotated[bool | None, or_auto(texts.flag_rule())] = None
+    viscous_drag: Annotated[float, rules.number_rule("N s/m^2", minimum=0)] = 0.0
     ends: Annotated[
         dict[str, End],
         Shorthand(
             "ends by name: x in m, or a table with position and orientation",
-            _as_ends,
+            _widen_ends,
             {
                 "type": "object",
                 "additionalProperties": {"type": ["number", "string", "array", "object"]},
@@ -195,15 +214,15 @@ class BeamKeys(FlexibleTable, SectionTable):
         polar_inertia_per_length is not, the latter is the sum of both entries, as for every plane
         section.
         """
-        pieces = self.section or (
-            Section.model_construct(from_=0.0, to=self.length, **dict.fromkeys(_DATA)),
+        given_sections = self.section or (
+            Section.model_construct(from_=0.0, to=self.length, **dict.fromkeys(_SECTION_KEYS)),
         )
-        return tuple(self._filled(piece) for piece in pieces)
+        return tuple(self._filled(given_section) for given_section in given_sections)
 
     def _filled(self, piece: Section) -> Section:
         data = {
             key: getattr(self, key) if getattr(piece, key) is None else getattr(piece, key)
-            for key in _DATA
+            for key in _SECTION_KEYS
         }
         if data["polar_inertia_per_length"] is None and data["rotary_inertia"] is not None:
             data["polar_inertia_per_length"] = sum(data["rotary_inertia"])
@@ -212,7 +231,10 @@ class BeamKeys(FlexibleTable, SectionTable):
     @property
     def mass(self) -> float:
         """Total mass (kg)."""
-        return sum((s.mass_per_length or 0.0) * (s.to - s.from_) for s in self.sections)
+        return sum(
+            (section_data.mass_per_length or 0.0) * (section_data.to - section_data.from_)
+            for section_data in self.sections
+        )
 
     @property
     def mode_names(self) -> tuple[str, ...] | None:
@@ -221,10 +243,13 @@ class BeamKeys(FlexibleTable, SectionTable):
         This is the case for "auto", and for a tangent frame at an inner section, which has
         clamped-free shapes on both sides.
         """
-        inner = [name for name in self.ends if 0 < self.end_x(name) < self.length]
-        either_side = self.frame_end in inner if self.frame_end else bool(inner)
-        clamped = self.basis in (AUTO, "clamped-free") and self.frame_kind in (AUTO, "tangent")
-        if self.modes is None or (clamped and either_side):
+        inner_ends = [name for name in self.ends if 0 < self.end_x(name) < self.length]
+        has_inner_frame = self.frame_end in inner_ends if self.frame_end else bool(inner_ends)
+        may_be_clamped = self.basis in (AUTO, "clamped-free") and self.frame_kind in (
+            AUTO,
+            "tangent",
+        )
+        if self.modes is None or (may_be_clamped and has_inner_frame):
             return None
         return self.modes.names
 
@@ -233,4 +258,4 @@ class BeamKeys(FlexibleTable, SectionTable):
         return self.ends[at or ROOT].position[0]
 
 
-_DATA = tuple(SectionTable.model_fields)
+_SECTION_KEYS = tuple(SectionTable.model_fields)

@@ -6,30 +6,30 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from ...numbers.rotations import IDENTITY, Matrix, Vector, from_orientation
-from ..rules import text as texts
-from ..rules import turns
-from ..rules import values as rules
-from ..rules.inertia import without_dust
-from ..rules.values import (
-    LARGEST,
-    NAME,
+from ...numerics.rotations import IDENTITY, Matrix, Vector, from_orientation
+from ..validators import names_and_text as texts
+from ..validators import rotations_and_inertia
+from ..validators import scalars_and_vectors as rules
+from ..validators.inertia import without_rounding
+from ..validators.scalars_and_vectors import (
+    MAX_ENTRY,
+    NAME_PATTERN,
     Location,
     Numbers,
     Orientation,
-    Refused,
     Shorthand,
     Table,
-    found,
-    refuse,
+    ValidationProblems,
+    describe_value,
+    problem,
 )
 
 
 class End(Table):
     """Output end of a body: position (m) and orientation in body axes."""
 
-    position: Annotated[Vector, rules.vector("m")]
-    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
+    position: Annotated[Vector, rules.vector_rule("m")]
+    orientation: Annotated[Orientation, rotations_and_inertia.orientation_rule()] = (0.0, 0.0, 0.0)
 
     @property
     def rotation(self) -> Matrix:
@@ -37,18 +37,20 @@ class End(Table):
         return from_orientation(self.orientation)
 
 
-def as_end(value: Any) -> Any:
+def widen_end(value: Any) -> Any:
     """Expand a position to the table of an end with the axes of the body."""
     return {"position": value} if isinstance(value, (list, tuple)) else value
 
 
-def _as_ends(value: Any) -> Any:
+def _widen_ends(value: Any) -> Any:
     if not isinstance(value, dict):
-        raise refuse(f"expected a table such as {{ tip = [1, 0, 0] }}, found {found(value)}")
+        raise problem(
+            f"expected a table such as {{ tip = [1, 0, 0] }}, found {describe_value(value)}"
+        )
     for key in value:
-        if not isinstance(key, str) or not NAME.fullmatch(key):
-            raise refuse(f"expected the name of an end, found {found(key)}")
-    return {key: as_end(v) for key, v in value.items()}
+        if not isinstance(key, str) or not NAME_PATTERN.fullmatch(key):
+            raise problem(f"expected the name of an end, found {describe_value(key)}")
+    return {key: widen_end(v) for key, v in value.items()}
 
 
 class BodyTable(Table):
@@ -58,20 +60,27 @@ class BodyTable(Table):
     (xx, yy, zz, xy, xz, yz), tensor entries (Jxy = -int xy dm), kg m^2.
     """
 
-    type: Annotated[str, texts.name("a body type")] = "rigid"
-    mass: Annotated[float, rules.number("kg", minimum=0)] = 0.0
-    center_of_mass: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    inertia: Annotated[Numbers, turns.inertia()] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    allow_unphysical_inertia: Annotated[bool, texts.flag()] = False
+    type: Annotated[str, texts.name_rule("a body type")] = "rigid"
+    mass: Annotated[float, rules.number_rule("kg", minimum=0)] = 0.0
+    center_of_mass: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
+    inertia: Annotated[Numbers, rotations_and_inertia.inertia_rule()] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    allow_unphysical_inertia: Annotated[bool, texts.flag_rule()] = False
     ends: Annotated[
         dict[str, End],
         Shorthand(
             "output ends: name -> [x, y, z] in m, or a table with position and orientation",
-            _as_ends,
+            _widen_ends,
             {"type": "object", "additionalProperties": {"type": "array"}},
         ),
     ] = Field(default_factory=dict)
-    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
+    parameters: Annotated[dict[str, float], texts.parameters_rule()] = Field(default_factory=dict)
 
     @property
     def inertia_matrix(self) -> Matrix:
@@ -80,7 +89,7 @@ class BodyTable(Table):
         Moments that are negative by rounding are zero.
         """
         xx, yy, zz, xy, xz, yz = self.inertia
-        return without_dust(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), self.mass)
+        return without_rounding(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)), self.mass)
 
     def end_position(self, at: str) -> Vector:
         """Position (m) of the end `at` in body axes; "" is the origin of the body."""
@@ -98,19 +107,19 @@ class BodyTable(Table):
         if self.type == "rigid" and "mass" not in self.model_fields_set:
             problems.append((("mass",), "missing; expected a number in kg, 0 or more"))
         if self.type == "rigid" and self.parameters:
-            way_out = "set type to your user-defined type"
-            problems.append((("parameters",), f"a rigid body has no parameters; {way_out}"))
+            remedy = "set type to your user-defined type"
+            problems.append((("parameters",), f"a rigid body has no parameters; {remedy}"))
         moment = float(self.mass) * sum(float(x) ** 2 for x in self.center_of_mass)
-        if not max(float(self.mass), moment, *(abs(float(x)) for x in self.inertia)) <= LARGEST:
-            limit = f"at most {LARGEST:g} kg and kg m^2, above which products overflow"
-            of = "mass, mass times the square of center_of_mass, and inertia"
-            problems.append((("mass",), f"expected {of}: {limit}"))
+        if not max(float(self.mass), moment, *(abs(float(x)) for x in self.inertia)) <= MAX_ENTRY:
+            limit = f"at most {MAX_ENTRY:g} kg and kg m^2, above which products overflow"
+            quantities = "mass, mass times the square of center_of_mass, and inertia"
+            problems.append((("mass",), f"expected {quantities}: {limit}"))
         if problems:
-            raise Refused(*problems)
+            raise ValidationProblems(*problems)
         return self
 
 
 class Body(BodyTable):
     """Body of a scene: rigid, or of a user-defined type."""
 
-    name: Annotated[str, texts.name("the body's name")]
+    name: Annotated[str, texts.name_rule("the body's name")]

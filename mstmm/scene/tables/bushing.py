@@ -6,17 +6,31 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from ...numbers.rotations import Matrix, Vector, from_orientation
-from ..rules import text as texts
-from ..rules import turns
-from ..rules import values as rules
-from ..rules.symmetric import antisymmetric, full, refuse_nonconservative, six_by_six, triangle
-from ..rules.values import GROUND, Numbers, Orientation, Shorthand, Table, refuse, split
-from .body import End, as_end
+from ...numerics.rotations import Matrix, Vector, from_orientation
+from ..validators import names_and_text as texts
+from ..validators import rotations_and_inertia
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import (
+    GROUND,
+    Numbers,
+    Orientation,
+    Shorthand,
+    Table,
+    problem,
+    split_reference,
+)
+from ..validators.symmetric_matrices import (
+    antisymmetric_part,
+    check_conservative,
+    full_matrix,
+    matrix_6x6,
+    upper_triangle,
+)
+from .body import End, widen_end
 
-_NOTHING = (0.0,) * 6
+_SIX_ZEROS = (0.0,) * 6
 #: Positions of the translational entries in the upper triangle of a 6 x 6 matrix.
-_ALONG = (0, 1, 2, 6, 7, 11)
+_TRANSLATION_POSITIONS = (0, 1, 2, 6, 7, 11)
 
 
 class Bushing(Table):
@@ -32,42 +46,42 @@ class Bushing(Table):
     seal.  The load -N e of the antisymmetric part N of K then has no potential and counts as work.
     """
 
-    name: Annotated[str, texts.name("the bushing's name")] = ""
-    from_: Annotated[str, texts.end()] = Field(alias="from")
-    to: Annotated[str, texts.end()]
-    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
+    name: Annotated[str, texts.name_rule("the bushing's name")] = ""
+    from_: Annotated[str, texts.end_rule()] = Field(alias="from")
+    to: Annotated[str, texts.end_rule()]
+    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation, rotations_and_inertia.orientation_rule()] = (0.0, 0.0, 0.0)
     rest: Annotated[
         End,
         Shorthand(
-            "[x, y, z] in m, or a table with position and orientation", as_end, {"type": "array"}
+            "[x, y, z] in m, or a table with position and orientation", widen_end, {"type": "array"}
         ),
     ] = End(position=(0.0, 0.0, 0.0))
-    stiffness: Annotated[Numbers, six_by_six("N/m", "N m/rad")] = _NOTHING
-    damping: Annotated[Numbers, six_by_six("N s/m", "N m s/rad")] = _NOTHING
-    preload: Annotated[Numbers, rules.numbers("three forces in N and three moments in N m", 6)] = (
-        _NOTHING
-    )
+    stiffness: Annotated[Numbers, matrix_6x6("N/m", "N m/rad")] = _SIX_ZEROS
+    damping: Annotated[Numbers, matrix_6x6("N s/m", "N m s/rad")] = _SIX_ZEROS
+    preload: Annotated[
+        Numbers, rules.numbers_rule("three forces in N and three moments in N m", 6)
+    ] = _SIX_ZEROS
 
-    conservative: Annotated[bool, texts.flag()] = True
+    conservative: Annotated[bool, texts.flag_rule()] = True
 
     @model_validator(mode="after")
     def _check(self) -> Bushing:
-        bodies = (split(self.from_)[0], split(self.to)[0])
+        bodies = (split_reference(self.from_)[0], split_reference(self.to)[0])
         if bodies[0] == bodies[1]:
-            raise refuse(
+            raise problem(
                 f'both ends are on "{bodies[0]}", so it has no effect; connect two bodies', "to"
             )
         if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
-            raise refuse(
+            raise problem(
                 "only a bushing on the ground has a position; define an end of the body there",
                 "position",
             )
         if not any((*self.stiffness, *self.damping, *self.preload)):
-            raise refuse("missing; a bushing needs stiffness, damping or a preload", "stiffness")
+            raise problem("missing; a bushing needs stiffness, damping or a preload", "stiffness")
         if self.conservative:
-            refuse_nonconservative(self.stiffness, "stiffness")
-            refuse_nonconservative(self.damping, "damping")
+            check_conservative(self.stiffness, "stiffness")
+            check_conservative(self.damping, "damping")
         return self
 
     @property
@@ -78,39 +92,50 @@ class Bushing(Table):
     @property
     def numbers(self) -> Numbers:
         """Parameters of the force element: stiffness, damping and preload."""
-        both, preload = (self.stiffness, self.damping), self.preload
-        symmetric, skew = (
-            tuple(x for one in both for x in part(one)) for part in (triangle, antisymmetric)
+        given_matrices, preload = (self.stiffness, self.damping), self.preload
+        symmetric_entries, antisymmetric_entries = (
+            tuple(x for given_matrix in given_matrices for x in part_of(given_matrix))
+            for part_of in (upper_triangle, antisymmetric_part)
         )
         if self.element == "bearing3":
-            symmetric = tuple(one[k] for one in map(triangle, both) for k in _ALONG)
-            skew = tuple(one[k] for one in map(antisymmetric, both) for k in (0, 1, 5))
+            symmetric_entries = tuple(
+                given_matrix[k]
+                for given_matrix in map(upper_triangle, given_matrices)
+                for k in _TRANSLATION_POSITIONS
+            )
+            antisymmetric_entries = tuple(
+                given_matrix[k]
+                for given_matrix in map(antisymmetric_part, given_matrices)
+                for k in (0, 1, 5)
+            )
             preload = preload[:3]
-        found = (*symmetric, *preload)
-        return found if self.conservative else (*found, *skew)
+        parameter_values = (*symmetric_entries, *preload)
+        return (
+            parameter_values if self.conservative else (*parameter_values, *antisymmetric_entries)
+        )
 
     @property
     def element(self) -> str:
         """Name of the force element; one without moments, whose ends may spin, where possible."""
         if self.conservative:
             return "bushing6"
-        moments = (matrix[i][j] for matrix in map(full, (self.stiffness, self.damping))
+        moments = (matrix[i][j] for matrix in map(full_matrix, (self.stiffness, self.damping))
                    for i in range(6) for j in range(6) if max(i, j) > 2)  # fmt: skip
         return "bearing6" if any((*moments, *self.preload[3:])) else "bearing3"
 
     @property
     def stiffest(self) -> tuple[float, float]:
         """Largest stiffness along axes (N/m) and about them (N m/rad)."""
-        return _largest(self.stiffness)
+        return _largest_entries(self.stiffness)
 
     @property
     def most_damped(self) -> tuple[float, float]:
         """Largest damping along axes (N s/m) and about them (N m s/rad)."""
-        return _largest(self.damping)
+        return _largest_entries(self.damping)
 
 
-def _largest(given: Numbers) -> tuple[float, float]:
-    matrix = full(given)
-    along, about = ([abs(matrix[i][j]) for i in part for j in part]
-                    for part in (range(3), range(3, 6)))  # fmt: skip
-    return max(along), max(about)
+def _largest_entries(given: Numbers) -> tuple[float, float]:
+    matrix = full_matrix(given)
+    translations, rotations = ([abs(matrix[i][j]) for i in indices for j in indices]
+                    for indices in (range(3), range(3, 6)))  # fmt: skip
+    return max(translations), max(rotations)

@@ -8,26 +8,35 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, model_validator
 
-from ...numbers.rotations import Vector
-from ..rules import text as texts
-from ..rules import turns
-from ..rules import values as rules
-from ..rules.values import GROUND, Location, Orientation, Refused, Shorthand, Table, refuse, split
+from ...numerics.rotations import Vector
+from ..validators import names_and_text as texts
+from ..validators import rotations_and_inertia
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import (
+    GROUND,
+    Location,
+    Orientation,
+    Shorthand,
+    Table,
+    ValidationProblems,
+    problem,
+    split_reference,
+)
 from .body import BodyTable
 from .hinge import HingeTable
 
 #: Longest chain; 1e6 bodies need some gigabytes.
-MAX_COUNT = 10_000_000
+MAX_CHAIN_COUNT = 10_000_000
 
 #: Name of a member's hinge after the name of the member: "rope[3].hinge".
-HINGE = "hinge"
+HINGE_SUFFIX = "hinge"
 
 
-def _pattern(what: str) -> Shorthand:
+def _pattern_rule(what: str) -> Shorthand:
     def widen(value: Any) -> Any:
         value = [value] if isinstance(value, (dict, BaseModel)) else value
         if isinstance(value, (list, tuple)) and not value:
-            raise refuse(f"expected a {what} table or a list of them, found an empty list")
+            raise problem(f"expected a {what} table or a list of them, found an empty list")
         return value
 
     expected = f"a {what} table, or a list of {what} tables that is repeated along the chain"
@@ -43,14 +52,14 @@ class Chain(Table):
     end).  `orientation` replaces that of the first hinge (None: the one in its table).
     """
 
-    name: Annotated[str, texts.name("the chain's name")]
-    count: Annotated[int, rules.whole(1, MAX_COUNT)]
-    inboard: Annotated[str, texts.end()]
-    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    orientation: Annotated[Orientation | None, turns.orientation()] = None
-    end: Annotated[str | None, texts.name("the end that connects to the next body")] = None
-    body: Annotated[tuple[BodyTable, ...], _pattern("body")]
-    hinge: Annotated[tuple[HingeTable, ...], _pattern("hinge")]
+    name: Annotated[str, texts.name_rule("the chain's name")]
+    count: Annotated[int, rules.integer(1, MAX_CHAIN_COUNT)]
+    inboard: Annotated[str, texts.end_rule()]
+    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
+    orientation: Annotated[Orientation | None, rotations_and_inertia.orientation_rule()] = None
+    end: Annotated[str | None, texts.name_rule("the end that connects to the next body")] = None
+    body: Annotated[tuple[BodyTable, ...], _pattern_rule("body")]
+    hinge: Annotated[tuple[HingeTable, ...], _pattern_rule("hinge")]
 
     @property
     def period(self) -> int:
@@ -85,16 +94,16 @@ class Chain(Table):
     def _check(self) -> Chain:
         problems = [*self._misplaced(), *self._too_many(), *self._ends()]
         if problems:
-            raise Refused(*problems)
+            raise ValidationProblems(*problems)
         return self
 
     def _misplaced(self) -> Iterator[tuple[Location, str]]:
-        on = split(self.inboard)[0]
-        if on != GROUND and self.position != (0.0, 0.0, 0.0):
+        inboard_body = split_reference(self.inboard)[0]
+        if inboard_body != GROUND and self.position != (0.0, 0.0, 0.0):
             yield (
                 ("position",),
                 'only a chain with inboard = "ground" has a position; '
-                f'define an end of "{on}" there',
+                f'define an end of "{inboard_body}" there',
             )
 
     def _too_many(self) -> Iterator[tuple[Location, str]]:
@@ -108,15 +117,15 @@ class Chain(Table):
 
     def _ends(self) -> Iterator[tuple[Location, str]]:
         """Problems of the ends that connect to the next member."""
-        carriers = min(self.count - 1, len(self.body))
+        connecting_count = min(self.count - 1, len(self.body))
         for i, body in enumerate(self.body):
             names = list(body.ends)
-            if HINGE in names:
+            if HINGE_SUFFIX in names:
                 yield (
-                    ("body", i, "ends", HINGE),
-                    f'"{self.name}[0].{HINGE}" is the name of a hinge; rename this end',
+                    ("body", i, "ends", HINGE_SUFFIX),
+                    f'"{self.name}[0].{HINGE_SUFFIX}" is the name of a hinge; rename this end',
                 )
-            if i >= carriers and self.end is None:
+            if i >= connecting_count and self.end is None:
                 continue
             if self.end is not None and self.end not in names:
                 yield (
@@ -125,9 +134,9 @@ class Chain(Table):
                     f"give it ends = {{ {self.end} = [x, y, z] }}",
                 )
             elif self.end is None and len(names) != 1:
-                has = ", ".join(names) if names else "no end"
-                way_out = f'write end = "{names[0]}"' if names else "give it one"
+                ends_text = ", ".join(names) if names else "no end"
+                remedy = f'write end = "{names[0]}"' if names else "give it one"
                 yield (
                     ("body", i, "ends"),
-                    f"expected one end for the next body, found {has}; {way_out}",
+                    f"expected one end for the next body, found {ends_text}; {remedy}",
                 )

@@ -7,18 +7,18 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from ...expression.expression import Expression, Name
-from ...numbers.rotations import Vector, unit
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules.values import GROUND, Table, refuse, split
+from ...numerics.rotations import Vector, unit_vector
+from ..validators import names_and_text as texts
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import GROUND, Table, problem, split_reference
 
 DISTANCE, PLANE, CURVE, ROLLING = "distance", "point-on-plane", "point-on-curve", "rolling"
 #: Required and optional keys of each type, besides the common ones.
-_KEYS = {
+_KEYS_BY_TYPE = {
     DISTANCE: (("length",), ()), PLANE: (("normal",), ("offset",)),
     CURVE: (("curve",), ("start",)), ROLLING: (("normal", "radius"), ("offset", "axis")),
 }  # fmt: skip
-_EXPECTED = {
+_KEY_DESCRIPTIONS = {
     "length": "a number in m, more than 0", "radius": "a number in m, more than 0",
     "normal": 'three numbers, the normal in the axes of the end "{}", such as [0, 1, 0]',
     "curve": "three expressions of s, a point in m in the axes of the end \"{}\", such as "
@@ -38,52 +38,52 @@ class Constraint(Table):
     the ground.
     """
 
-    name: Annotated[str, texts.name("the constraint's name")] = ""
-    type: Annotated[str, texts.choice(*_KEYS)]
-    from_: Annotated[str, texts.end()] = Field(alias="from")
-    to: Annotated[str, texts.end()]
-    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
-    length: Annotated[float | None, rules.number("m", above=0)] = None
-    normal: Annotated[Vector | None, rules.direction()] = None
-    offset: Annotated[float | None, rules.number("m")] = None
+    name: Annotated[str, texts.name_rule("the constraint's name")] = ""
+    type: Annotated[str, texts.choice_rule(*_KEYS_BY_TYPE)]
+    from_: Annotated[str, texts.end_rule()] = Field(alias="from")
+    to: Annotated[str, texts.end_rule()]
+    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
+    length: Annotated[float | None, rules.number_rule("m", above=0)] = None
+    normal: Annotated[Vector | None, rules.direction_rule()] = None
+    offset: Annotated[float | None, rules.number_rule("m")] = None
     curve: Annotated[
         tuple[Expression, Expression, Expression] | None,
-        texts.expressions("three expressions of s", 3),
+        texts.expressions_rule("three expressions of s", 3),
     ] = None
-    start: Annotated[float | None, rules.number("of s")] = None
-    radius: Annotated[float | None, rules.number("m", above=0)] = None
-    axis: Annotated[Vector | None, rules.direction()] = None
+    start: Annotated[float | None, rules.number_rule("of s")] = None
+    radius: Annotated[float | None, rules.number_rule("m", above=0)] = None
+    axis: Annotated[Vector | None, rules.direction_rule()] = None
 
     @model_validator(mode="after")
     def _check(self) -> Constraint:
-        bodies = (split(self.from_)[0], split(self.to)[0])
+        bodies = (split_reference(self.from_)[0], split_reference(self.to)[0])
         if bodies[0] == bodies[1]:
-            raise refuse(f'both ends are on "{bodies[0]}"; connect two bodies', "to")
+            raise problem(f'both ends are on "{bodies[0]}"; connect two bodies', "to")
         if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
-            raise refuse(
+            raise problem(
                 "only a constraint on the ground has a position; define an end of the body there",
                 "position",
             )
-        needed, more = _KEYS[self.type]
-        for key in _OWN_KEYS:
-            if getattr(self, key) is not None and key not in (*needed, *more):
-                raise refuse(f'a "{self.type}" has no {key}; leave it out', key)
-        for key in needed:
+        required_keys, optional_keys = _KEYS_BY_TYPE[self.type]
+        for key in _TYPE_KEYS:
+            if getattr(self, key) is not None and key not in (*required_keys, *optional_keys):
+                raise problem(f'a "{self.type}" has no {key}; leave it out', key)
+        for key in required_keys:
             if getattr(self, key) is None:
-                raise refuse(f"missing; expected {_EXPECTED[key].format(self.from_)}", key)
+                raise problem(f"missing; expected {_KEY_DESCRIPTIONS[key].format(self.from_)}", key)
         if self.type == ROLLING and bodies[1] == GROUND:
-            raise refuse("expected a body, found the ground; swap from and to", "to")
+            raise problem("expected a body, found the ground; swap from and to", "to")
         return self
 
     @property
     def unit_normal(self) -> Vector | None:
         """Unit normal in the axes of the end `from`, or None."""
-        return None if self.normal is None else _unit(self.normal)
+        return None if self.normal is None else _unit_vector(self.normal)
 
     @property
     def unit_axis(self) -> Vector:
         """Unit axis of a disc in the axes of the end `to`; zero for a ball."""
-        return (0.0, 0.0, 0.0) if self.axis is None else _unit(self.axis)
+        return (0.0, 0.0, 0.0) if self.axis is None else _unit_vector(self.axis)
 
     @property
     def rows(self) -> int:
@@ -91,11 +91,13 @@ class Constraint(Table):
         return {CURVE: 2, ROLLING: 3}.get(self.type, 1)
 
 
-_OWN_KEYS = tuple(dict.fromkeys(key for pair in _KEYS.values() for keys in pair for key in keys))
+_TYPE_KEYS = tuple(
+    dict.fromkeys(key for pair in _KEYS_BY_TYPE.values() for keys in pair for key in keys)
+)
 
 
-def _unit(vector: Vector) -> Vector:
-    x, y, z = unit(vector)
+def _unit_vector(vector: Vector) -> Vector:
+    x, y, z = unit_vector(vector)
     return (x, y, z)
 
 
@@ -107,25 +109,25 @@ class Coupling(Table):
     number or an expression of t.
     """
 
-    name: Annotated[str, texts.name("the coupling's name")] = ""
+    name: Annotated[str, texts.name_rule("the coupling's name")] = ""
     expression: Annotated[
         Expression | None,
-        texts.formula('an expression of coordinates such as "sun.q - 3*carrier.q"'),
+        texts.formula_rule('an expression of coordinates such as "sun.q - 3*carrier.q"'),
     ] = None
     speeds: Annotated[
         Expression | None,
-        texts.formula('an expression of speeds such as "0.3*wheel.u - cart.u"'),
+        texts.formula_rule('an expression of speeds such as "0.3*wheel.u - cart.u"'),
     ] = None
-    equals: Annotated[Expression | None, texts.one_expression("a number or an expression of t")] = (
-        None
-    )
+    equals: Annotated[
+        Expression | None, texts.expression_rule("a number or an expression of t")
+    ] = None
 
     @model_validator(mode="after")
     def _check(self) -> Coupling:
         if self.expression is None and self.speeds is None:
-            raise refuse("missing; give expression or speeds", "expression")
+            raise problem("missing; give expression or speeds", "expression")
         if self.expression is not None and self.speeds is not None:
-            raise refuse(
+            raise problem(
                 "expected expression or speeds, found both; define two couplings", "speeds"
             )
         return self
@@ -144,8 +146,12 @@ class Coupling(Table):
     @property
     def goes_by_time(self) -> bool:
         """Whether it prescribes motion, as a drive does."""
-        by = self.equals
-        return by is not None and not by.is_zero if self.speeds else bool(by and by.names)
+        equals = self.equals
+        return (
+            equals is not None and not equals.is_zero
+            if self.speeds
+            else bool(equals and equals.names)
+        )
 
     @property
     def names(self) -> tuple[Name, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from ..rules.values import Refused
+from ..validators.scalars_and_vectors import ValidationProblems
 from . import elastic_rules as checks
 from .elastic_keys import ElasticKeys
 
@@ -20,5 +20,5 @@ class Elastic(ElasticKeys):
     def _check(self) -> Elastic:
         problems = list(checks.problems(self))
         if problems:
-            raise Refused(*problems)
+            raise ValidationProblems(*problems)
         return self

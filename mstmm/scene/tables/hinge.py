@@ -7,12 +7,12 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from ...expression.expression import Expression
-from ...numbers.rotations import Vector
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules.values import GROUND, Location, split
-from .hinge_keys import HingeKeys, Rated
-from .hinge_rules import settled
+from ...numerics.rotations import Vector
+from ..validators import names_and_text as texts
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import GROUND, Location, split_reference
+from .hinge_keys import HingeKeys, HingeRating
+from .hinge_rules import resolve_defaults
 
 
 class HingeTable(HingeKeys):
@@ -26,7 +26,7 @@ class HingeTable(HingeKeys):
 
     @model_validator(mode="after")
     def _settle(self) -> Self:
-        for key, value in settled(self).items():
+        for key, value in resolve_defaults(self).items():
             object.__setattr__(self, key, value)
         return self
 
@@ -40,43 +40,43 @@ class Hinge(HingeTable):
     `hold` keeps those of q exactly.  `rated` has no effect on the motion.
     """
 
-    name: Annotated[str, texts.name("the hinge's name")]
-    inboard: Annotated[str, texts.end()]
-    outboard: Annotated[str, texts.end()]
-    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    name: Annotated[str, texts.name_rule("the hinge's name")]
+    inboard: Annotated[str, texts.end_rule()]
+    outboard: Annotated[str, texts.end_rule()]
+    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
     release: Annotated[
         Expression | None,
-        texts.condition('a time in s or a comparison such as "t >= 1"', time=True),
+        texts.condition_rule('a time in s or a comparison such as "t >= 1"', time=True),
     ] = None
-    cut: Annotated[bool | None, texts.flag()] = None
-    hold: Annotated[bool, texts.flag()] = False
-    rated: Rated | None = None
+    cut: Annotated[bool | None, texts.flag_rule()] = None
+    hold: Annotated[bool, texts.flag_rule()] = False
+    rated: HingeRating | None = None
 
     @model_validator(mode="after")
     def _rates(self) -> Hinge:
-        kind = self.builtin
-        if self.rated is not None and kind is not None and len(kind.speeds) != 1:
-            raise rules.refuse("only hinges of one coordinate are rated; leave it out", "rated")
+        facts_of_type = self.builtin
+        if self.rated is not None and facts_of_type is not None and len(facts_of_type.speeds) != 1:
+            raise rules.problem("only hinges of one coordinate are rated; leave it out", "rated")
         return self
 
     @property
     def inboard_body(self) -> str:
         """Name of the inboard body, or "ground"."""
-        return split(self.inboard)[0]
+        return split_reference(self.inboard)[0]
 
     @property
     def inboard_end(self) -> str:
         """Inboard end of the hinge, "" for the origin of the body or the ground."""
-        return split(self.inboard)[1]
+        return split_reference(self.inboard)[1]
 
     @property
     def outboard_body(self) -> str:
-        return split(self.outboard)[0]
+        return split_reference(self.outboard)[0]
 
     @property
     def outboard_end(self) -> str:
         """Outboard end of the hinge, "" for the origin of the body."""
-        return split(self.outboard)[1]
+        return split_reference(self.outboard)[1]
 
     def misplaced(self) -> list[tuple[Location, str]]:
         """Problems of the ends: ground as outboard, a single body, or a misplaced position."""

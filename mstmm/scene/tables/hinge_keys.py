@@ -8,36 +8,36 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from ...expression.expression import Expression
-from ...ir.facts import HingeFacts, builtin_hinges
-from ...numbers.rotations import Matrix, Vector, from_orientation, reject, unit
-from ..rules import text as texts
-from ..rules import turns
-from ..rules import values as rules
-from ..rules.values import Location, Numbers, Orientation, Table
+from ...ir.hinge_properties import HingeProperties, builtin_hinges
+from ...numerics.rotations import Matrix, Vector, from_orientation, unit_rejection, unit_vector
+from ..validators import names_and_text as texts
+from ..validators import rotations_and_inertia
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import Location, Numbers, Orientation, Table
 from .law import Law
 
 
 class Initial(Table):
     """Initial values of a hinge: q (quaternions w, x, y, z) and u, one entry per coordinate."""
 
-    q: Annotated[Numbers | None, rules.numbers("one number per coordinate")] = None
-    u: Annotated[Numbers | None, rules.numbers("one number per speed")] = None
+    q: Annotated[Numbers | None, rules.numbers_rule("one number per coordinate")] = None
+    u: Annotated[Numbers | None, rules.numbers_rule("one number per speed")] = None
 
 
-class Rated(Table):
+class HingeRating(Table):
     """Rating of a joint: range, largest effort and speed; without effect on the motion."""
 
-    lower: Annotated[float | None, rules.number("m or rad")] = None
-    upper: Annotated[float | None, rules.number("m or rad")] = None
-    effort: Annotated[float | None, rules.number("N or N m", minimum=0)] = None
-    velocity: Annotated[float | None, rules.number("m/s or rad/s", minimum=0)] = None
+    lower: Annotated[float | None, rules.number_rule("m or rad")] = None
+    upper: Annotated[float | None, rules.number_rule("m or rad")] = None
+    effort: Annotated[float | None, rules.number_rule("N or N m", minimum=0)] = None
+    velocity: Annotated[float | None, rules.number_rule("m/s or rad/s", minimum=0)] = None
 
     @model_validator(mode="after")
-    def _check(self) -> Rated:
+    def _check(self) -> HingeRating:
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             hint = "; swap them" if self.lower > self.upper else ""
-            what = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
-            raise rules.refuse(what, "lower")
+            message = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
+            raise rules.problem(message, "lower")
         return self
 
 
@@ -45,30 +45,31 @@ class HingeKeys(Table):
     """Keys of a hinge, before and after `HingeTable` resolves their defaults."""
 
     type: Annotated[
-        str, texts.name("a hinge type", ", ".join(builtin_hinges()) + " or a user-defined type")
+        str,
+        texts.name_rule("a hinge type", ", ".join(builtin_hinges()) + " or a user-defined type"),
     ]
-    orientation: Annotated[Orientation, turns.orientation()] = (0.0, 0.0, 0.0)
-    axis: Annotated[Vector, rules.direction()] = (0.0, 0.0, 1.0)
-    axis2: Annotated[Vector | None, rules.direction()] = None
-    normal: Annotated[Vector | None, rules.direction()] = None
-    lead: Annotated[float | None, rules.number("m per turn")] = None
+    orientation: Annotated[Orientation, rotations_and_inertia.orientation_rule()] = (0.0, 0.0, 0.0)
+    axis: Annotated[Vector, rules.direction_rule()] = (0.0, 0.0, 1.0)
+    axis2: Annotated[Vector | None, rules.direction_rule()] = None
+    normal: Annotated[Vector | None, rules.direction_rule()] = None
+    lead: Annotated[float | None, rules.number_rule("m per turn")] = None
     initial: Initial | None = None
     law: Law = Law()
     drive: Annotated[
         tuple[Expression | None, ...] | None,
-        texts.expressions(
+        texts.expressions_rule(
             'an expression of t, or a list with one per coordinate ("free" where none)', free=True
         ),
     ] = None
-    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
+    parameters: Annotated[dict[str, float], texts.parameters_rule()] = Field(default_factory=dict)
 
     @property
-    def builtin(self) -> HingeFacts | None:
+    def builtin(self) -> HingeProperties | None:
         """Facts of the built-in type, None for a user-defined type."""
         return builtin_hinges().get(self.type)
 
     @cached_property
-    def facts(self) -> HingeFacts | None:
+    def facts(self) -> HingeProperties | None:
         """Facts of the type: coordinates, speeds, keys.
 
         None for a user-defined type until `Scene.check_types` provides its definition.
@@ -88,7 +89,7 @@ class HingeKeys(Table):
     @property
     def unit_axis(self) -> Vector:
         """Unit axis; for planar hinges the unit normal."""
-        x, y, z = unit(self.axis)
+        x, y, z = unit_vector(self.axis)
         return (x, y, z)
 
     @property
@@ -97,8 +98,8 @@ class HingeKeys(Table):
         if self.axis2 is None:
             return None
         if self.facts is not None and self.facts.frame == "plane":
-            return reject(self.axis2, self.axis)
-        x, y, z = unit(self.axis2)
+            return unit_rejection(self.axis2, self.axis)
+        x, y, z = unit_vector(self.axis2)
         return (x, y, z)
 
     def misplaced(self) -> list[tuple[Location, str]]:

@@ -7,9 +7,9 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import BaseModel, model_validator
 
 from ...expression.expression import Expression, number
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules.values import Table
+from ..validators import names_and_text as texts
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import Table
 
 Numbers = tuple[float, ...]
 
@@ -20,10 +20,10 @@ class Friction(Table):
     All zero means no friction.  `static` 0 means equal to `coulomb`.
     """
 
-    coulomb: Annotated[float, rules.number("N or N m", minimum=0)] = 0.0
-    static: Annotated[float, rules.number("N or N m", minimum=0)] = 0.0
-    stribeck_velocity: Annotated[float, rules.number("m/s or rad/s", above=0)] = 0.01
-    regularisation_velocity: Annotated[float, rules.number("m/s or rad/s", above=0)] = 0.001
+    coulomb: Annotated[float, rules.number_rule("N or N m", minimum=0)] = 0.0
+    static: Annotated[float, rules.number_rule("N or N m", minimum=0)] = 0.0
+    stribeck_velocity: Annotated[float, rules.number_rule("m/s or rad/s", above=0)] = 0.01
+    regularisation_velocity: Annotated[float, rules.number_rule("m/s or rad/s", above=0)] = 0.001
 
     @property
     def acts(self) -> bool:
@@ -35,7 +35,7 @@ class Friction(Table):
         if self.static == 0:
             object.__setattr__(self, "static", self.coulomb)
         if self.static < self.coulomb:
-            raise rules.refuse(
+            raise rules.problem(
                 f"static friction {self.static:g} is below coulomb friction {self.coulomb:g}; "
                 "leave it out, or increase it", "static",
             )  # fmt: skip
@@ -49,11 +49,11 @@ class Limits(Table):
     ratio of separation speed to approach speed.
     """
 
-    lower: Annotated[float | None, rules.number("m or rad")] = None
-    upper: Annotated[float | None, rules.number("m or rad")] = None
-    stiffness: Annotated[float, rules.number("N/m or N m/rad", minimum=0)] = 0.0
-    damping: Annotated[float, rules.number("N s/m or N m s/rad", minimum=0)] = 0.0
-    restitution: Annotated[float | None, rules.number(above=0.0)] = None
+    lower: Annotated[float | None, rules.number_rule("m or rad")] = None
+    upper: Annotated[float | None, rules.number_rule("m or rad")] = None
+    stiffness: Annotated[float, rules.number_rule("N/m or N m/rad", minimum=0)] = 0.0
+    damping: Annotated[float, rules.number_rule("N s/m or N m s/rad", minimum=0)] = 0.0
+    restitution: Annotated[float | None, rules.number_rule(above=0.0)] = None
 
     @property
     def acts(self) -> bool:
@@ -69,16 +69,16 @@ class Limits(Table):
     def _check(self) -> Limits:
         if self.lower is not None and self.upper is not None and self.lower >= self.upper:
             hint = "; swap them" if self.lower > self.upper else ""
-            what = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
-            raise rules.refuse(what, "lower")
+            message = f"lower ({self.lower:g}) must be below upper ({self.upper:g}){hint}"
+            raise rules.problem(message, "lower")
         if not self.acts and (self.stiffness > 0 or self.damping > 0 or self.restitution):
-            raise rules.refuse("limits need lower, upper or both", "lower")
+            raise rules.problem("limits need lower, upper or both", "lower")
         return self if self.restitution is None else self._hard(self.restitution)
 
     @model_validator(mode="after")
     def _pushes(self) -> Limits:
         if self.yields and self.stiffness == 0:
-            raise rules.refuse(
+            raise rules.problem(
                 "a stop needs a stiffness above 0 (N/m or N m/rad) or a restitution; "
                 "write for example stiffness = 1e5", "stiffness",
             )  # fmt: skip
@@ -86,12 +86,12 @@ class Limits(Table):
 
     def _hard(self, restitution: float) -> Limits:
         if restitution > 1:
-            raise rules.refuse(
-                f"expected at most 1 (no loss), found {rules.found(restitution)}",
+            raise rules.problem(
+                f"expected at most 1 (no loss), found {rules.describe_value(restitution)}",
                 "restitution",
             )
         if self.stiffness > 0 or self.damping > 0:
-            raise rules.refuse(
+            raise rules.problem(
                 "expected restitution or stiffness for a stop, found both; give one",
                 "restitution",
             )
@@ -110,18 +110,18 @@ class LawEntry(NamedTuple):
     limits: Limits
 
 
-def _one_or_list(value: Any) -> Any:
+def _widen_to_list(value: Any) -> Any:
     return [value] if isinstance(value, (dict, BaseModel)) else value
 
 
-def _per_coordinate(one: str, minimum: float | None = None) -> rules.Rule:
+def _per_coordinate_rule(one: str, minimum: float | None = None) -> rules.Rule:
     bound = "" if minimum is None else f", {minimum:g} or more"
     expected = f"{one}{bound}, or a list, one per coordinate"
-    return rules.numbers(expected, minimum=minimum, of=one.removeprefix("a number in "))
+    return rules.numbers_rule(expected, minimum=minimum, of=one.removeprefix("a number in "))
 
 
-_TABLES = rules.Shorthand(
-    "a table, or a list of tables, one per coordinate", _one_or_list, {"type": "object"}
+_TABLES_RULE = rules.Shorthand(
+    "a table, or a list of tables, one per coordinate", _widen_to_list, {"type": "object"}
 )
 
 
@@ -135,16 +135,20 @@ class Law(Table):
     one number may be given for all coordinates.
     """
 
-    stiffness: Annotated[Numbers, _per_coordinate("a number in N/m or N m/rad", minimum=0)] = ()
-    rest: Annotated[Numbers, _per_coordinate("a number in m or rad")] = ()
-    damping: Annotated[Numbers, _per_coordinate("a number in N s/m or N m s/rad", minimum=0)] = ()
+    stiffness: Annotated[
+        Numbers, _per_coordinate_rule("a number in N/m or N m/rad", minimum=0)
+    ] = ()
+    rest: Annotated[Numbers, _per_coordinate_rule("a number in m or rad")] = ()
+    damping: Annotated[
+        Numbers, _per_coordinate_rule("a number in N s/m or N m s/rad", minimum=0)
+    ] = ()
     effort: Annotated[
         tuple[Expression, ...],
-        texts.expressions("a number or expression in N or N m, or a list, one per coordinate"),
+        texts.expressions_rule("a number or expression in N or N m, or a list, one per coordinate"),
     ] = ()
-    inertia: Annotated[Numbers, _per_coordinate("a number in kg or kg m^2", minimum=0)] = ()
-    friction: Annotated[tuple[Friction, ...], _TABLES] = ()
-    limits: Annotated[tuple[Limits, ...], _TABLES] = ()
+    inertia: Annotated[Numbers, _per_coordinate_rule("a number in kg or kg m^2", minimum=0)] = ()
+    friction: Annotated[tuple[Friction, ...], _TABLES_RULE] = ()
+    limits: Annotated[tuple[Limits, ...], _TABLES_RULE] = ()
 
     def entries(self) -> tuple[LawEntry, ...]:
         """Laws of all coordinates; at least one, which has no effect if nothing is given."""
@@ -172,10 +176,10 @@ class SpringLaw(Table):
     effort > 0 pushes the two ends apart; in it `q` is the length (m), `u` its rate (m/s).
     """
 
-    stiffness: Annotated[float, rules.number("N/m", minimum=0)] = 0.0
-    rest: Annotated[float, rules.number("m", minimum=0)] = 0.0
-    damping: Annotated[float, rules.number("N s/m", minimum=0)] = 0.0
+    stiffness: Annotated[float, rules.number_rule("N/m", minimum=0)] = 0.0
+    rest: Annotated[float, rules.number_rule("m", minimum=0)] = 0.0
+    damping: Annotated[float, rules.number_rule("N s/m", minimum=0)] = 0.0
     effort: Annotated[
         Expression,
-        texts.one_expression("a number or expression in N"),
+        texts.expression_rule("a number or expression in N"),
     ] = number(0)

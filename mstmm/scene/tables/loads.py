@@ -8,17 +8,17 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from ...expression.expression import Expression, number, parse
-from ...numbers.rotations import Vector
-from ..rules import text as texts
-from ..rules import values as rules
-from ..rules.values import GROUND, Table, found, refuse, split
+from ...numerics.rotations import Vector
+from ..validators import names_and_text as texts
+from ..validators import scalars_and_vectors as rules
+from ..validators.scalars_and_vectors import GROUND, Table, describe_value, problem, split_reference
+from .body_hinge_lookup import Hinges
 from .hinge import Hinge
 from .law import SpringLaw
-from .members import Hinges
 
 #: The only value of `at` of a load.
 MASS_CENTER = "center_of_mass"
-_ZERO = (number(0), number(0), number(0))
+_ZERO_VECTOR = (number(0), number(0), number(0))
 
 
 class Load(Table):
@@ -32,25 +32,25 @@ class Load(Table):
     `force_per_length`.
     """
 
-    name: Annotated[str, texts.name("the load's name")] = ""
-    on: Annotated[str, texts.end(ground=False)]
-    at: Annotated[str | None, texts.choice(MASS_CENTER)] = None
+    name: Annotated[str, texts.name_rule("the load's name")] = ""
+    on: Annotated[str, texts.end_rule(ground=False)]
+    at: Annotated[str | None, texts.choice_rule(MASS_CENTER)] = None
     force: Annotated[
         tuple[Expression, Expression, Expression],
-        texts.expressions("three numbers or expressions in N", 3),
-    ] = _ZERO
+        texts.expressions_rule("three numbers or expressions in N", 3),
+    ] = _ZERO_VECTOR
     moment: Annotated[
         tuple[Expression, Expression, Expression],
-        texts.expressions("three numbers or expressions in N m", 3),
-    ] = _ZERO
+        texts.expressions_rule("three numbers or expressions in N m", 3),
+    ] = _ZERO_VECTOR
     force_per_length: Annotated[
         tuple[Expression, Expression, Expression] | None,
-        texts.expressions("three numbers or expressions in N/m", 3),
+        texts.expressions_rule("three numbers or expressions in N/m", 3),
     ] = None
     span: Annotated[
-        tuple[float, float] | None, rules.numbers("[from, to] along the beam in m", 2, of="m")
+        tuple[float, float] | None, rules.numbers_rule("[from, to] along the beam in m", 2, of="m")
     ] = None
-    axes: Annotated[str, texts.body('"inertial", "body" or the name of a body')] = "inertial"
+    axes: Annotated[str, texts.body_rule('"inertial", "body" or the name of a body')] = "inertial"
 
     @model_validator(mode="after")
     def _check(self) -> Load:
@@ -58,35 +58,39 @@ class Load(Table):
             self._check_mass_center()
         if self.force_per_length is None:
             if self.span is not None:
-                raise refuse("only force_per_length acts on a span; leave it out", "span")
+                raise problem("only force_per_length acts on a span; leave it out", "span")
             return self
         for key in ("force", "moment"):
             if not all(entry.is_zero for entry in getattr(self, key)):
-                raise refuse(
+                raise problem(
                     f"{key} acts at a point, force_per_length along a beam; write two loads", key
                 )
-        if split(self.on)[1]:
-            raise refuse(
+        if split_reference(self.on)[1]:
+            raise problem(
                 "expected the name of a beam without an end for force_per_length, found "
-                f"{found(self.on)}; write {found(split(self.on)[0])}, and span for a part of it",
+                f"{describe_value(self.on)}; write {describe_value(split_reference(self.on)[0])}, "
+                f"and span for a part of it",
                 "on",
             )
         if self.span is not None and not 0 <= self.span[0] < self.span[1]:
-            raise refuse(
-                f"expected [from, to] in m with 0 <= from < to, found {found(self.span)}", "span"
+            raise problem(
+                f"expected [from, to] in m with 0 <= from < to, found {describe_value(self.span)}",
+                "span",
             )
         return self
 
     def _check_mass_center(self) -> None:
         """Reject a load at the mass centre with an end or a force per length.  Raises Refused."""
-        body, end = split(self.on)
+        body, end = split_reference(self.on)
         if end:
-            raise refuse(
-                f'"{MASS_CENTER}" needs a body without an end, found on = {found(self.on)}; '
-                f"write on = {found(body)}, or leave `at` out", "at",
-            )  # fmt: skip
+            raise problem(
+                f'"{MASS_CENTER}" needs a body without an end, found on = '
+                f"{describe_value(self.on)}; "
+                f"write on = {describe_value(body)}, or leave `at` out",
+                "at",
+            )
         if self.force_per_length is not None:
-            raise refuse("force_per_length acts along a beam; leave `at` out", "at")
+            raise problem("force_per_length acts along a beam; leave `at` out", "at")
 
 
 class Event(Table):
@@ -96,62 +100,64 @@ class Event(Table):
     most 1).  Closed loops remain closed.
     """
 
-    name: Annotated[str, texts.name("the event's name")] = ""
-    when: Annotated[Expression, texts.condition('a comparison such as "rod1.x < 0.1"')]
-    do: Annotated[str, texts.choice("stop", "release", "bounce")]
-    hinge: Annotated[str | None, texts.name("the hinge to release")] = None
-    restitution: Annotated[float | None, rules.number(above=0.0)] = None
+    name: Annotated[str, texts.name_rule("the event's name")] = ""
+    when: Annotated[Expression, texts.condition_rule('a comparison such as "rod1.x < 0.1"')]
+    do: Annotated[str, texts.choice_rule("stop", "release", "bounce")]
+    hinge: Annotated[str | None, texts.name_rule("the hinge to release")] = None
+    restitution: Annotated[float | None, rules.number_rule(above=0.0)] = None
 
     @model_validator(mode="after")
     def _check(self) -> Event:
         if (self.do == "bounce") != (self.restitution is not None):
-            raise refuse(
+            raise problem(
                 'missing; do = "bounce" needs a number above 0, at most 1' if self.do == "bounce"
                 else 'only do = "bounce" has a restitution; leave it out', "restitution",
             )  # fmt: skip
         if self.restitution is not None and self.restitution > 1:
-            raise refuse(
-                f"expected at most 1 (no loss), found {found(self.restitution)}",
+            raise problem(
+                f"expected at most 1 (no loss), found {describe_value(self.restitution)}",
                 "restitution",
             )
         if self.do == "release" and self.hinge is None:
-            raise refuse('missing; do = "release" needs the name of a hinge', "hinge")
+            raise problem('missing; do = "release" needs the name of a hinge', "hinge")
         if self.do != "release" and self.hinge is not None:
-            raise refuse('only do = "release" has a hinge; leave it out', "hinge")
+            raise problem('only do = "release" has a hinge; leave it out', "hinge")
         return self
 
 
-def stops_of(hinges: Hinges) -> tuple[Event, ...]:
+def stop_events(hinges: Hinges) -> tuple[Event, ...]:
     """Events of all hard stops in the order of the hinges.
 
     Their names are such as `knee.upper` or `planar.lower[1]`.
     """
     return tuple(
-        stop for number in _stopped(hinges) for stop in _of(hinges.name(number), hinges[number])
+        stop
+        for number in _hinges_with_hard_stops(hinges)
+        for stop in _stop_events_of_hinge(hinges.name(number), hinges[number])
     )
 
 
-def _stopped(hinges: Hinges) -> Iterator[int]:
+def _hinges_with_hard_stops(hinges: Hinges) -> Iterator[int]:
     """Indices of the hinges that have hard stops."""
     for k, hinge in enumerate(hinges.tables):
         if any(limits.restitution for limits in hinge.law.limits):
             yield k
-    for chain, first in zip(hinges.chains, hinges.starts, strict=False):
+    for chain, first_number in zip(hinges.chains, hinges.starts, strict=False):
         for k, pattern in enumerate(chain.hinge):
             if any(limits.restitution for limits in pattern.law.limits):
-                yield from range(first + k, first + chain.count, len(chain.hinge))
+                yield from range(first_number + k, first_number + chain.count, len(chain.hinge))
 
 
-def _of(name: str, hinge: Hinge) -> Iterator[Event]:
+def _stop_events_of_hinge(name: str, hinge: Hinge) -> Iterator[Event]:
     count = len(hinge.law.limits) if hinge.facts is None else len(hinge.facts.speeds)
     for k in range(count):
         limits = hinge.law.entry(k).limits
-        for key, sign in (("lower", "<"), ("upper", ">")):
-            place = getattr(limits, key)
-            if limits.restitution is not None and place is not None:
+        for key, comparison in (("lower", "<"), ("upper", ">")):
+            limit = getattr(limits, key)
+            if limits.restitution is not None and limit is not None:
                 yield Event.model_construct(
                     name=f"{name}.{key}" + (f"[{k}]" if count > 1 else ""),
-                    when=parse(f"{name}.q[{k}] {sign} {place!r}"), do="bounce", hinge=None,
+                    when=parse(f"{name}.q[{k}] {comparison} {limit!r}"), do="bounce", hinge=None,
                     restitution=limits.restitution,
                 )  # fmt: skip
 
@@ -162,29 +168,29 @@ class Spring(Table):
     `position` (m) is the position of an end on the ground.
     """
 
-    name: Annotated[str, texts.name("the spring's name")] = ""
-    type: Annotated[str, texts.name("a force element type")] = "spring"
-    from_: Annotated[str, texts.end()] = Field(alias="from")
-    to: Annotated[str, texts.end()]
-    position: Annotated[Vector, rules.vector("m")] = (0.0, 0.0, 0.0)
+    name: Annotated[str, texts.name_rule("the spring's name")] = ""
+    type: Annotated[str, texts.name_rule("a force element type")] = "spring"
+    from_: Annotated[str, texts.end_rule()] = Field(alias="from")
+    to: Annotated[str, texts.end_rule()]
+    position: Annotated[Vector, rules.vector_rule("m")] = (0.0, 0.0, 0.0)
     law: SpringLaw = SpringLaw()
-    parameters: Annotated[dict[str, float], texts.parameters()] = Field(default_factory=dict)
+    parameters: Annotated[dict[str, float], texts.parameters_rule()] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _check(self) -> Spring:
-        bodies = (split(self.from_)[0], split(self.to)[0])
+        bodies = (split_reference(self.from_)[0], split_reference(self.to)[0])
         if bodies[0] == bodies[1]:
-            raise refuse(
+            raise problem(
                 f'both ends are on "{bodies[0]}", so it has no effect; connect two bodies', "to"
             )
         if GROUND not in bodies and self.position != (0.0, 0.0, 0.0):
-            raise refuse(
+            raise problem(
                 "only a spring on the ground has a position; define an end of the body there",
                 "position",
             )
         if self.type == "spring" and self.parameters:
-            raise refuse("a spring has no parameters; set type to your user-defined type",
+            raise problem("a spring has no parameters; set type to your user-defined type",
                          "parameters")  # fmt: skip
         if self.type != "spring" and self.law != SpringLaw():
-            raise refuse('law belongs to type "spring"; use parameters', "law")
+            raise problem('law belongs to type "spring"; use parameters', "law")
         return self

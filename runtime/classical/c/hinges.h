@@ -18,16 +18,16 @@ extern const real classical_nothing[36];
 
 static inline int which_pairing(int inner, int outer) { return 2 * (inner > 0) + (outer > 0); }
 
-/* beside.c */
+/* hinge_sections.c */
 slopes classical_slopes(const step_record *step, int body);
 void classical_outboard_axes(const step_record *step, int body, real *axes);
 void classical_outboard_spin(const step_record *step, int body, real *spin);
 void classical_axis(const real *axes, real *axis);
 void classical_pin_axis(const step_record *step, int index, real *axis);
-/* condition.c */
+/* free_rotation_conditions.c */
 void classical_own_condition(const step_record *step, int body, int outboard, int middle,
                              real *rows);
-/* joint.c */
+/* rigid_hinges.c */
 int classical_fixed(const step_record *step, int body, const real *modal, real *matrix);
 int classical_turning(const step_record *step, int body, int inner, const real *rows,
                       const real *modal, real *matrix);

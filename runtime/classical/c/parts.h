@@ -84,12 +84,12 @@ void classical_quaternion(const real *rotation, real *quaternion);
 /* body.c */
 section classical_section(const step_record *step, int body);
 int classical_body(const step_record *step, int body, int outlet, real *matrix, real *modal);
-/* hinge.c */
+/* hinge_matrices.c */
 int classical_free_turns(const step_record *step, int body);
 int classical_condition(const step_record *step, int body, int outboard, real *rows);
 int classical_hinge(const step_record *step, int body, const real *rows, const real *modal,
                     real *matrix);
-/* relation.c */
+/* body_relation.c */
 int classical_outlets(const step_record *step, int body);
 int classical_alone(const step_record *step, int body, real *matrix, real *relation);
 int classical_carried(const step_record *step, int body, int child, real *relation);
@@ -101,7 +101,7 @@ void classical_widened(const step_record *step, int body, int count, const real 
 /* riccati.c, product.c */
 int classical_riccati(const step_record *step);
 int classical_product(const step_record *step);
-/* outward.c */
+/* forward_pass.c */
 int classical_outward(const step_record *step);
 
 #endif

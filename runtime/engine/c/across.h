@@ -5,7 +5,7 @@
 #define MSTMM_ACROSS_H
 
 #include "band_lu.h"
-#include "tangent_parts.h"
+#include "tangent_workspace.h"
 
 /* Unit solutions of all unknowns and their coupling matrix, for the factored tangent.  `negative`:
  * whether the determinant of the tree's tangent is negative. */

@@ -68,7 +68,7 @@ MSTMM_COMPLEX double mstmm_complex_sizes(mstmm_complex a)
 /* x = a^-1 b by LU with row exchange, the same in all lanes; arguments and result of
  * mstmm_solve_lu (templates/solve_lu.c.jinja), singular if one of the lanes is.  A pivot is
  * refused where it is zero alone: frequencies are asked for, and counted, next to where they
- * vanish, and the digits that are lost are told by how inertia grows (complex_swept.h). */
+ * vanish, and the digits that are lost are told by how inertia grows (complex_sweeps.h). */
 MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *restrict a,
                                         const mstmm_complex *restrict b, mstmm_complex *restrict x,
                                         mstmm_complex *restrict work, double relative_pivot)

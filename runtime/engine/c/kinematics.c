@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "finite.h"
+#include "is_finite.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
 

@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "hinge.h"
+#include "hinge_call.h"
 #include "loops.h"
 #include "sweep.h"
 #include "sweep_steps.h"

@@ -5,10 +5,10 @@
 #include <string.h>
 
 #include "across.h"
-#include "aim.h"
-#include "hinge.h"
+#include "derivative_direction.h"
+#include "hinge_call.h"
 #include "sweep_steps.h"
-#include "tiles.h"
+#include "cache_tiling.h"
 
 int64_t mstmm_bend_numbers(int n);
 int64_t mstmm_port_numbers(int n);

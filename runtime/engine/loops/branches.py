@@ -15,28 +15,28 @@ from functools import cached_property
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import MstmmError
-from mstmm.ir.facts import start_of
+from mstmm.ir.hinge_properties import default_coordinates
 from mstmm.scene import Hinge, Scene
 
-from ...pack.loops.variants import length_of
-from ...pack.pack import pack
-from ...pack.packed import Packed
-from ..engine import Engine
+from ...packing.loops.system_variants import length_of
+from ...packing.packed_scene import PackedScene
+from ...packing.scene_packing import pack
+from ..looped_engine import LoopedEngine
 from .assembly import Assembly
 
 #: Maximum number of random starts, of their speeds in total, and of the speeds of one; maximum
 #: number of hinges of a scene whose bodies are placed again.
-_TRIES, _IN_SUM, _SPEEDS, _PLACED = 12, 240, 60, 300
+_MAX_STARTS, _MAX_TOTAL_SPEEDS, _MAX_SPEEDS, _MAX_PLACED_HINGES = 12, 240, 60, 300
 #: Maximum number of steps on a branch, the longest step, and one that counts as none (rad, m).
-_STEPS, _LONGEST, _STILL = 40, 0.5, 1e-4
+_MAX_STEPS, _MAX_STEP, _NEGLIGIBLE_STEP = 40, 0.5, 1e-4
 #: A squared norm of speeds that counts as zero.
-_NONE = 1e-30
+_NEGLIGIBLE_SQUARE = 1e-30
 #: Largest distance (rad, m) of two states on the same branch.
-_APART = 1e-2
+_MAX_BRANCH_DISTANCE = 1e-2
 #: A start within this distance (rad, lengths) is the nearest; smallest difference that counts.
-_NEAR, _NEARER = 1e-3, 1e-6
+_NEAREST_DISTANCE, _MIN_IMPROVEMENT = 1e-3, 1e-6
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Branch:
     pose: Mapping[str, tuple[float, ...]]
 
 
-class Wishes:
+class RequestedCoordinates:
     """Requested coordinates `q` (nq,); those of hinges in `kept` are satisfied in any case.
 
     With `stated` only initial states in the scene count.  If several hinges carry one body, the
@@ -63,17 +63,19 @@ class Wishes:
     """
 
     def __init__(
-        self, packed: Packed, q: Array, kept: Collection[str], stated: bool = True
+        self, packed: PackedScene, q: Array, kept: Collection[str], stated: bool = True
     ) -> None:
         self.packed, self.q, self._length = packed, q, length_of(packed.system)
         self.kept = tuple(kept)
-        counting = _stating(packed.described) if stated else packed.described.hinge
+        counting_hinges = (
+            _hinges_with_initial_state(packed.described) if stated else packed.described.hinge
+        )
         #: Indices in q of requested angles, lengths and quaternions.
         self.angles, self.lengths, self._fours = list[int](), list[int](), list[int]()
         #: Indices in q of all angles, requested or not.
         self.turning = list[int]()
-        driven = {hinge.name for hinge in packed.described.hinge if hinge.drive is not None}
-        names = {one.name for one in counting} - {*kept} - driven
+        driven_hinges = {hinge.name for hinge in packed.described.hinge if hinge.drive is not None}
+        names = {counted_hinge.name for counted_hinge in counting_hinges} - {*kept} - driven_hinges
         for hinge in packed.described.hinge:
             self._sort(hinge, hinge.name in names)
 
@@ -83,103 +85,111 @@ class Wishes:
             self._fours += [slots.q + slots.quaternion] * counts
         elif facts is not None and slots.straight:
             for k in range(slots.nq):
-                slides = k in facts.slides
-                self.turning += [slots.q + k] * (not slides)
-                (self.lengths if slides else self.angles).extend([slots.q + k] * counts)
+                is_sliding = k in facts.slides
+                self.turning += [slots.q + k] * (not is_sliding)
+                (self.lengths if is_sliding else self.angles).extend([slots.q + k] * counts)
 
     def off(self, q: Array) -> Array:
         """Deviation (nq,) of q from the requested coordinates; angles within half a turn."""
-        found = np.zeros(len(q))
-        found[self.lengths] = (q - self.q)[self.lengths]
-        found[self.angles] = _wrapped((q - self.q)[self.angles])
-        return found
+        deviation = np.zeros(len(q))
+        deviation[self.lengths] = (q - self.q)[self.lengths]
+        deviation[self.angles] = _wrap_angles((q - self.q)[self.angles])
+        return deviation
 
     def distance(self, q: Array) -> float:
         """Distance of q from the requested coordinates, see `Branch`."""
-        off = self.off(q)
-        squares = float(np.sum(off[self.angles] ** 2))
-        squares += float(np.sum((off[self.lengths] / self._length) ** 2))
-        for place in self._fours:
-            along = abs(float(q[place : place + 4] @ self.q[place : place + 4]))
-            squares += (2.0 * math.acos(min(1.0, along))) ** 2
+        deviation = self.off(q)
+        squares = float(np.sum(deviation[self.angles] ** 2))
+        squares += float(np.sum((deviation[self.lengths] / self._length) ** 2))
+        for first in self._fours:
+            cosine = abs(float(q[first : first + 4] @ self.q[first : first + 4]))
+            squares += (2.0 * math.acos(min(1.0, cosine))) ** 2
         return math.sqrt(squares)
 
     def nearest_turn(self, q: Array) -> Array:
         """Shift the angles of q by whole turns to be nearest to the requested ones."""
-        found = q.copy()
-        found[self.turning] = (self.q + _wrapped(q - self.q))[self.turning]
-        return found
+        shifted = q.copy()
+        shifted[self.turning] = (self.q + _wrap_angles(q - self.q))[self.turning]
+        return shifted
 
     def toward(self, q: Array) -> Array:
         """Change (nu,) along the speeds from q to the requested coordinates."""
-        off, layout, found = self.off(q), self.packed.layout, np.zeros(self.packed.layout.nu)
+        deviation, layout, change = self.off(q), self.packed.layout, np.zeros(self.packed.layout.nu)
         for hinge in self.packed.described.hinge:
             slots = layout.hinges[hinge.name]
             if slots.nq == slots.nu:
-                found[slots.u_slice] = -off[slots.q_slice]
-        return found
+                change[slots.u_slice] = -deviation[slots.q_slice]
+        return change
 
     def drawn(self, draw: np.random.Generator) -> Array:
         """Random change (nu,) along the speeds: up to half a turn, or the length of the scene."""
-        found, layout = np.zeros(self.packed.layout.nu), self.packed.layout
+        change, layout = np.zeros(self.packed.layout.nu), self.packed.layout
         for hinge in self.packed.described.hinge:
             slots, facts = layout.hinges[hinge.name], hinge.facts
-            slides = {*range(slots.nu)} if facts is None else {*facts.slides}
+            sliding_speeds = {*range(slots.nu)} if facts is None else {*facts.slides}
             for k in range(slots.nu):
-                most = self._length if k in slides else math.pi
-                found[slots.u + k] = draw.uniform(-most, most)
-        return found
+                bound = self._length if k in sliding_speeds else math.pi
+                change[slots.u + k] = draw.uniform(-bound, bound)
+        return change
 
 
-class Search:
+class BranchSearch:
     """Search for branches near `wishes` on which `assembly` closes the loops, gaps up to `much`.
 
     The branch of `first` (nq,), to which steps from the start lead, precedes others that are as
     near.
     """
 
-    def __init__(self, assembly: Assembly, wishes: Wishes, first: Array, much: float = 0.0) -> None:
+    def __init__(
+        self, assembly: Assembly, wishes: RequestedCoordinates, first: Array, much: float = 0.0
+    ) -> None:
         self._assembly, self._wishes, self._first, self._much = assembly, wishes, first, much
 
     def is_near(self) -> bool:
         """True if `first` is at the requested coordinates: no other branch is nearer."""
-        return self._wishes.distance(self._first) < _NEAR
+        return self._wishes.distance(self._first) < _NEAREST_DISTANCE
 
     def nearest(self) -> Array:
         """State `first` (nq,), or one on a nearer branch."""
         if len(self.found) < 2:
             return self._first
-        best, far = self.found[0], self._wishes.distance(self._settled_first)
-        if best.distance < far - _NEARER:
-            return self._wishes.nearest_turn(best.q)
+        nearest_branch, first_distance = self.found[0], self._wishes.distance(self._settled_first)
+        if nearest_branch.distance < first_distance - _MIN_IMPROVEMENT:
+            return self._wishes.nearest_turn(nearest_branch.q)
         return self._first
 
     @cached_property
     def found(self) -> tuple[Branch, ...]:
         """All branches found, the nearest first."""
         starts = (self._assembly.nearest_closed(start, self._much) for start in self._starts())
-        others = [closed for closed in starts if closed is not None]
-        wishes, states = self._wishes, [self._settled_first if others else self._first]
-        for closed in others:
-            state = self._settled(closed)
-            if all(self._apart(state, other) > _APART for other in states):
-                states.append(state)
-        ranked = sorted(states, key=lambda q: round(wishes.distance(q) / _NEARER))
+        closed_states = [closed for closed in starts if closed is not None]
+        requested, states = self._wishes, [self._settled_first if closed_states else self._first]
+        for closed in closed_states:
+            nearest_state = self._settled(closed)
+            if all(self._apart(nearest_state, other) > _MAX_BRANCH_DISTANCE for other in states):
+                states.append(nearest_state)
+        ranked = sorted(states, key=lambda q: round(requested.distance(q) / _MIN_IMPROVEMENT))
         return tuple(
-            Branch(wishes.distance(q), q, self._assembly.by_names(q))
-            for q in map(wishes.nearest_turn, ranked)
+            Branch(requested.distance(q), q, self._assembly.by_names(q))
+            for q in map(requested.nearest_turn, ranked)
         )
 
     def _starts(self) -> Iterator[Array]:
-        wishes, engine = self._wishes, self._assembly.calls.engine
-        placed = _placed(engine.packed, wishes.q, self._assembly.held, self._much)
-        if placed is not None:
-            yield placed
-        draw = np.random.default_rng(0)
-        tries = min(_TRIES, _IN_SUM // max(1, engine.nu)) if engine.nu <= _SPEEDS else 0
-        for _ in range(tries):
-            change = wishes.drawn(draw) * self._assembly.free
-            yield self._assembly.calls.moved(wishes.q, change)
+        requested, engine = self._wishes, self._assembly.calls.engine
+        placed_q = _start_from_placed_bodies(
+            engine.packed, requested.q, self._assembly.held, self._much
+        )
+        if placed_q is not None:
+            yield placed_q
+        random_generator = np.random.default_rng(0)
+        start_count = (
+            min(_MAX_STARTS, _MAX_TOTAL_SPEEDS // max(1, engine.nu))
+            if engine.nu <= _MAX_SPEEDS
+            else 0
+        )
+        for _ in range(start_count):
+            change = requested.drawn(random_generator) * self._assembly.free
+            yield self._assembly.calls.moved(requested.q, change)
 
     @cached_property
     def _settled_first(self) -> Array:
@@ -187,97 +197,119 @@ class Search:
 
     def _settled(self, q: Array) -> Array:
         """Move q on its branch to the state nearest to the requested coordinates."""
-        calls, far = self._assembly.calls, self._wishes.distance(q)
-        for _ in range(_STEPS):
+        calls, distance = self._assembly.calls, self._wishes.distance(q)
+        for _ in range(_MAX_STEPS):
             try:
-                wanted = self._assembly.free * self._wishes.toward(q)
-                speeds = wanted + self._assembly.free * calls.correction(calls.slip, q, wanted)[0]
-                speeds *= float(wanted @ speeds) / max(float(speeds @ speeds), _NONE)
+                requested_speeds = self._assembly.free * self._wishes.toward(q)
+                speeds = (
+                    requested_speeds
+                    + self._assembly.free * calls.correction(calls.slip, q, requested_speeds)[0]
+                )
+                speeds *= float(requested_speeds @ speeds) / max(
+                    float(speeds @ speeds), _NEGLIGIBLE_SQUARE
+                )
                 length = float(np.abs(speeds).max(initial=0.0))
-                if length < _STILL:
+                if length < _NEGLIGIBLE_STEP:
                     break
-                ahead = calls.moved(q, speeds * min(1.0, _LONGEST / length))
-                closed = self._assembly.nearest_closed(ahead, self._much)
+                ahead_q = calls.moved(q, speeds * min(1.0, _MAX_STEP / length))
+                closed_q = self._assembly.nearest_closed(ahead_q, self._much)
             except MstmmError:
                 break
-            if closed is None or not self._wishes.distance(closed) < far - _NEARER:
+            if (
+                closed_q is None
+                or not self._wishes.distance(closed_q) < distance - _MIN_IMPROVEMENT
+            ):
                 break
-            q, far = closed, self._wishes.distance(closed)
+            q, distance = closed_q, self._wishes.distance(closed_q)
         return q
 
     def _apart(self, one: Array, other: Array) -> float:
-        apart = one - other
-        apart[self._wishes.turning] = _wrapped(apart[self._wishes.turning])
-        return float(np.abs(apart).max(initial=0.0))
+        difference = one - other
+        difference[self._wishes.turning] = _wrap_angles(difference[self._wishes.turning])
+        return float(np.abs(difference).max(initial=0.0))
 
 
-def _wrapped(angles: Array) -> Array:
+def _wrap_angles(angles: Array) -> Array:
     return np.asarray((angles + math.pi) % (2.0 * math.pi) - math.pi)
 
 
-def _stating(scene: Scene) -> list[Hinge]:
+def _hinges_with_initial_state(scene: Scene) -> list[Hinge]:
     """Hinges whose initial states count."""
-    keepers = {body: _keeper(hinges) for body, hinges in _holding(scene).items()}
-    stated = [hinge for hinge in scene.hinge if _is_stated(hinge)]
-    return [hinge for hinge in stated if _is_moved(hinge) or keepers[hinge.outboard_body] is hinge]
+    determining_hinges = {
+        body: _determining_hinge(hinges) for body, hinges in _hinges_by_outboard_body(scene).items()
+    }
+    stated_hinges = [hinge for hinge in scene.hinge if _has_initial_q(hinge)]
+    return [
+        hinge
+        for hinge in stated_hinges
+        if _has_nondefault_q(hinge) or determining_hinges[hinge.outboard_body] is hinge
+    ]
 
 
-def _holding(scene: Scene) -> dict[str, list[Hinge]]:
+def _hinges_by_outboard_body(scene: Scene) -> dict[str, list[Hinge]]:
     """Hinges by their outboard body."""
-    found: dict[str, list[Hinge]] = {}
+    hinges_by_body: dict[str, list[Hinge]] = {}
     for hinge in scene.hinge:
-        found.setdefault(hinge.outboard_body, []).append(hinge)
-    return found
+        hinges_by_body.setdefault(hinge.outboard_body, []).append(hinge)
+    return hinges_by_body
 
 
-def _keeper(hinges: list[Hinge]) -> Hinge:
+def _determining_hinge(hinges: list[Hinge]) -> Hinge:
     """Of several hinges with the same outboard body, the one that determines its initial state."""
-    return next((hinge for hinge in hinges if _is_moved(hinge)), hinges[0])
+    return next((hinge for hinge in hinges if _has_nondefault_q(hinge)), hinges[0])
 
 
-def _is_stated(hinge: Hinge) -> bool:
+def _has_initial_q(hinge: Hinge) -> bool:
     return "initial" in hinge.model_fields_set and bool(hinge.initial and hinge.initial.q)
 
 
-def _is_moved(hinge: Hinge) -> bool:
+def _has_nondefault_q(hinge: Hinge) -> bool:
     """True if a hinge states an initial q that differs from the default."""
     if hinge.initial is None or not hinge.initial.q or hinge.facts is None:
         return False
-    usual = start_of(len(hinge.initial.q), hinge.facts.quaternion)
-    return _is_stated(hinge) and not np.array_equal(hinge.initial.q, usual)
+    default_q = default_coordinates(len(hinge.initial.q), hinge.facts.quaternion)
+    return _has_initial_q(hinge) and not np.array_equal(hinge.initial.q, default_q)
 
 
-def _placed(packed: Packed, q: Array, kept: Collection[str], much: float) -> Array | None:
+def _start_from_placed_bodies(
+    packed: PackedScene, q: Array, kept: Collection[str], much: float
+) -> Array | None:
     """Closed start (nq,) with every body placed by the hinge that states its initial state.
 
     None if the tree is the same, if the loops do not close from there, and for large scenes.
     """
     scene = packed.described
-    if len(scene.hinge) > _PLACED or scene.beam or scene.elastic or packed.releases:
+    if len(scene.hinge) > _MAX_PLACED_HINGES or scene.beam or scene.elastic or packed.releases:
         return None
-    cut = {
+    cut_hinges = {
         hinge.name
-        for hinges in _holding(scene).values()
-        for hinge in hinges if hinge is not _keeper(hinges)
+        for hinges in _hinges_by_outboard_body(scene).values()
+        for hinge in hinges if hinge is not _determining_hinge(hinges)
     }  # fmt: skip
-    if cut == {one.hinge for one in packed.expanded.cuts if one.constraint is None}:
+    if cut_hinges == {
+        cut_record.hinge for cut_record in packed.expanded.cuts if cut_record.constraint is None
+    }:
         return None
-    hinges = tuple(hinge.model_copy(update={"cut": hinge.name in cut}) for hinge in scene.hinge)
+    hinges = tuple(
+        hinge.model_copy(update={"cut": hinge.name in cut_hinges}) for hinge in scene.hinge
+    )
     fields = {name: getattr(scene, name) for name in type(scene).model_fields} | {"hinge": hinges}
     try:
-        other = pack(
+        repacked = pack(
             Scene.model_construct(**fields), packed.elements.known, simplify=packed.simplify
         )
-        start = _by_names(q, packed, other)
-        closed = Assembly(Engine(other), start, kept).nearest_closed(start, much)
+        start_q = _convert_q(q, packed, repacked)
+        closed_q = Assembly(LoopedEngine(repacked), start_q, kept).nearest_closed(start_q, much)
     except MstmmError:  # the determining hinges form a cycle
         return None
-    return None if closed is None else _by_names(closed, other, packed)
+    return None if closed_q is None else _convert_q(closed_q, repacked, packed)
 
 
-def _by_names(q: Array, packed: Packed, other: Packed) -> Array:
+def _convert_q(q: Array, packed: PackedScene, other: PackedScene) -> Array:
     """Convert q (nq,) of a scene to that of the same scene with other cuts."""
-    found = np.zeros(other.layout.nq)
+    converted = np.zeros(other.layout.nq)
     for hinge in packed.described.hinge:
-        found[other.layout.hinges[hinge.name].q_slice] = q[packed.layout.hinges[hinge.name].q_slice]
-    return found
+        converted[other.layout.hinges[hinge.name].q_slice] = q[
+            packed.layout.hinges[hinge.name].q_slice
+        ]
+    return converted

@@ -11,25 +11,25 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array
-from mstmm.errors import OpenLoop
+from mstmm.array_validation import Array
+from mstmm.errors import LoopClosureError
 
-from ...pack.loops.variants import length_of, with_rotors
-from ...pack.pack import packed_system
-from ..engine import Engine
+from ...packing.loops.system_variants import length_of, with_rotors
+from ...packing.scene_packing import packed_system
+from ..looped_engine import LoopedEngine
 from .assembly import Assembly
 
 #: Mechanisms with fewer speeds do not fold up.
-_MANY = 20
+_MIN_SPEEDS = 20
 #: Random change (rad, m) of a pose with all links in line.
-_ASIDE = 1e-3
+_RANDOM_CHANGE = 1e-3
 
 
 class RotorAssembly(Assembly):
     """Assembly that tries again with the inertia of rotors."""
 
     def __init__(
-        self, engine: Engine, q: Array, hinges: Collection[str] = (),
+        self, engine: LoopedEngine, q: Array, hinges: Collection[str] = (),
         behind: Callable[[Array], str] = lambda q: "", t: float = 0.0,
     ) -> None:  # fmt: skip
         super().__init__(engine, q, hinges, behind, t)
@@ -39,30 +39,30 @@ class RotorAssembly(Assembly):
         """See `Assembly.positions`."""
         try:
             return super().positions(q, *more, **others)
-        except OpenLoop as error:
-            if self._engine.nu < _MANY:
+        except LoopClosureError as error:
+            if self._engine.nu < _MIN_SPEEDS:
                 raise
-            beside = Assembly(self._with_rotors(), q, self._hinges, t=self._t)
+            rotor_assembly = Assembly(self._with_rotors(), q, self._hinges, t=self._t)
             try:
-                near = beside.positions(self._shaken(q), *more, **others)
-            except OpenLoop:
+                near_q = rotor_assembly.positions(self._shaken(q), *more, **others)
+            except LoopClosureError:
                 raise error from None
-            return super().positions(near, *more, **others)
+            return super().positions(near_q, *more, **others)
 
     def _shaken(self, q: Array) -> Array:
         """Change q slightly: with all links in line the direction of bending is undetermined."""
-        aside = _ASIDE * np.random.default_rng(0).uniform(-1.0, 1.0, self._engine.nu)
-        return self.calls.moved(q, aside * self.free)
+        change = _RANDOM_CHANGE * np.random.default_rng(0).uniform(-1.0, 1.0, self._engine.nu)
+        return self.calls.moved(q, change * self.free)
 
-    def _with_rotors(self) -> Engine:
+    def _with_rotors(self) -> LoopedEngine:
         """Engine with a rotor on each hinge: total mass times mean hinge distance squared."""
         packed = self._engine.packed
-        system, known = packed.system, packed.written.loops
+        system, loop_records = packed.system, packed.written.loops
         masses = system.rows(lambda body: body.body_p[0] if len(body.body_p) else 0.0)
         inertia = (float(masses.sum()) or 1.0) * length_of(system) ** 2
-        heavy = packed_system(
+        packed_with_rotors = packed_system(
             with_rotors(system, np.full(self._engine.nu, inertia).tolist()), packed
         )
-        assert known is not None and heavy.written.loops is not None
-        heavy.written.loops.judge_as(known)
-        return Engine(heavy)
+        assert loop_records is not None and packed_with_rotors.written.loops is not None
+        packed_with_rotors.written.loops.judge_as(loop_records)
+        return LoopedEngine(packed_with_rotors)

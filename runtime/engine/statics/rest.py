@@ -13,29 +13,29 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-_LONGEST = 0.5  # step, in characteristic scales of the coordinates
+_MAX_STEP = 0.5  # step, in characteristic scales of the coordinates
 #: Scaled stiffness below which a direction counts as slack: by simple differences, and by exact
 #: ones, which are used after steps shorter than the third number, in characteristic scales.
-_SOFT, _SOFTEST, _NEAR = 1e-8, 1e-10, 0.1
-_MAX_ITERATIONS, _ITERATIONS_OF_A_PART = 200, 20
+_SLACK_STIFFNESS, _SLACK_EXACT_STIFFNESS, _EXACT_STEP = 1e-8, 1e-10, 0.1
+_MAX_ITERATIONS, _MAX_ITERATIONS_OF_A_PART = 200, 20
 #: Forces without potential have no descent direction: relative asymmetry of their stiffness, and
 #: the number of iterations that then shows whether Newton's method converges.
-_SKEW, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
-_HALVINGS = 40
+_MAX_ASYMMETRY, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
+_MAX_HALVINGS = 40
 #: Permitted growth of efforts in a step: by this factor, or up to those of such a motion in
 #: characteristic scales.
-_MORE, _ASTRAY = 10.0, 1e-3
+_MAX_EFFORT_GROWTH, _MAX_EFFORT_MOTION = 10.0, 1e-3
 #: Steps of the difference quotients in characteristic scales: coarse, fine, and of fourth order,
 #: which are exact to about 1e-12, simple ones to 1e-8.  A stiffness that is no rounding agrees with
 #: the fine ones.
-_COARSE, _FINE, _WIDE = 1e-4, 1e-5, 1e-3
+_COARSE_STEP, _FINE_STEP, _FOURTH_ORDER_STEP = 1e-4, 1e-5, 1e-3
 #: Stiffness that is rounding, relative to the largest one, all in J.
-_NOTHING = 1e-16
+_RELATIVE_ROUNDING = 1e-16
 #: First fraction of the load that is tried if the whole load fails, and the smallest.
-_FIRST_PART, _LEAST_PART = 0.25, 2.0**-10
+_INITIAL_LOAD_STEP, _MIN_LOAD_STEP = 0.25, 2.0**-10
 
 
 class Unsettled(NumericalFailure):
@@ -82,16 +82,16 @@ class Rest:
     def efforts(self, q: Array) -> Array:
         """Efforts (n,) times characteristic scales, J.  NumericalFailure if not finite."""
         with np.errstate(all="ignore"):
-            found = self.needed(q) * self.sizes
-        if not np.isfinite(found).all():
+            scaled_efforts = self.needed(q) * self.sizes
+        if not np.isfinite(scaled_efforts).all():
             raise NumericalFailure("the efforts of this state are not finite")
-        return found
+        return scaled_efforts
 
     def after(self, q: Array, step: Array) -> Array:
         """Move q by a motion given in characteristic scales."""
         return self.moved(q, step * self.sizes)
 
-    def slope(self, q: Array, size: float = _COARSE) -> Array:
+    def slope(self, q: Array, size: float = _COARSE_STEP) -> Array:
         """Stiffness (n, n) in J, by central differences."""
         columns = [
             (self.efforts(self.after(q, unit)) - self.efforts(self.after(q, -unit))) / (2 * size)
@@ -101,14 +101,16 @@ class Rest:
 
     def exact_slope(self, q: Array) -> Array:
         """Stiffness (n, n) in J, by differences of fourth order."""
-        return np.asarray((4 * self.slope(q, _WIDE) - self.slope(q, 2 * _WIDE)) / 3)
+        return np.asarray(
+            (4 * self.slope(q, _FOURTH_ORDER_STEP) - self.slope(q, 2 * _FOURTH_ORDER_STEP)) / 3
+        )
 
 
-def at_rest(problem: Rest, q: Array, tolerance: float) -> Array:
+def find_determined_equilibrium(problem: Rest, q: Array, tolerance: float) -> Array:
     """Find an equilibrium as `approached` does; Undetermined if it has neutral directions."""
-    found = approached(problem, q, tolerance)
-    leaving(problem.at(found), found)
-    return found
+    equilibrium_q = approached(problem, q, tolerance)
+    unstable_coordinates(problem.at(equilibrium_q), equilibrium_q)
+    return equilibrium_q
 
 
 def approached(problem: Rest, q: Array, tolerance: float) -> Array:
@@ -118,32 +120,38 @@ def approached(problem: Rest, q: Array, tolerance: float) -> Array:
     start act as external efforts, which are reduced to zero in steps.  Raises Unsettled.
     """
     try:
-        return _newton(problem, q, tolerance, _MAX_ITERATIONS, _downhill)
+        return _solve_newton(problem, q, tolerance, _MAX_ITERATIONS, _descent_step)
     except Unsettled as failure:
         try:
-            return _in_parts(problem, q, tolerance)
+            return _solve_in_load_steps(problem, q, tolerance)
         except NumericalFailure:
             raise failure from None
 
 
-def _in_parts(problem: Rest, q: Array, tolerance: float) -> Array:
-    missing = problem.needed(q)
-    done, part = 0.0, _FIRST_PART
-    while done < 1.0:
-        goal = min(1.0, done + part)
-        loaded = Rest(_less(problem.needed, (1 - goal) * missing), problem.moved, problem.sizes)
+def _solve_in_load_steps(problem: Rest, q: Array, tolerance: float) -> Array:
+    missing_efforts = problem.needed(q)
+    load_fraction, load_step = 0.0, _INITIAL_LOAD_STEP
+    while load_fraction < 1.0:
+        target_fraction = min(1.0, load_fraction + load_step)
+        loaded_problem = Rest(
+            _with_external_efforts(problem.needed, (1 - target_fraction) * missing_efforts),
+            problem.moved,
+            problem.sizes,
+        )
         try:
-            q = _newton(loaded, q, tolerance, _ITERATIONS_OF_A_PART, _along_the_path)
+            q = _solve_newton(loaded_problem, q, tolerance, _MAX_ITERATIONS_OF_A_PART, _newton_step)
         except NumericalFailure:
-            part /= 2
-            if part < _LEAST_PART:
+            load_step /= 2
+            if load_step < _MIN_LOAD_STEP:
                 raise
             continue
-        done, part = goal, 1.5 * part
+        load_fraction, load_step = target_fraction, 1.5 * load_step
     return q
 
 
-def _less(needed: Callable[[Array], Array], given: Array) -> Callable[[Array], Array]:
+def _with_external_efforts(
+    needed: Callable[[Array], Array], given: Array
+) -> Callable[[Array], Array]:
     return lambda q: needed(q) - given
 
 
@@ -154,52 +162,54 @@ def _less(needed: Callable[[Array], Array], given: Array) -> Callable[[Array], A
 Stepping = Callable[[Array, Array, Array, float], Array]
 
 
-def _newton(
+def _solve_newton(
     problem: Rest, q: Array, tolerance: float, iterations: int, stepping: Stepping
 ) -> Array:
-    residual, length = problem.efforts(q), np.inf
+    residual, step_length = problem.efforts(q), np.inf
     for k in range(iterations):
-        nearby = problem.at(q)
-        if nearby is not problem:
-            problem, residual = nearby, nearby.efforts(q)
-        near = length < _NEAR
+        adapted_problem = problem.at(q)
+        if adapted_problem is not problem:
+            problem, residual = adapted_problem, adapted_problem.efforts(q)
+        is_near = step_length < _EXACT_STEP
         try:
-            slope = problem.exact_slope(q) if near else problem.slope(q)
+            stiffness = problem.exact_slope(q) if is_near else problem.slope(q)
         except NumericalFailure as failure:
             raise Unsettled(str(failure), residual / problem.sizes, problem) from None
-        scale = _scale(slope, residual)
-        if k >= _ITERATIONS_WITHOUT_POTENTIAL and _is_skew(slope, scale):
+        scale = _stiffness_scale(stiffness, residual)
+        if k >= _ITERATIONS_WITHOUT_POTENTIAL and _is_asymmetric(stiffness, scale):
             iterations = k
             break
-        step = stepping(slope, residual, scale, _SOFTEST if near else _SOFT)
-        length = float(np.abs(step).max(initial=0.0))
-        if length <= tolerance:
+        step = stepping(
+            stiffness, residual, scale, _SLACK_EXACT_STIFFNESS if is_near else _SLACK_STIFFNESS
+        )
+        step_length = float(np.abs(step).max(initial=0.0))
+        if step_length <= tolerance:
             return problem.after(q, step)
-        q, residual, falls = _followed(problem, q, residual, step, scale)
-        if not falls and length < _COARSE and _is_rounding(problem, q, residual):
+        q, residual, is_decreasing = _line_search(problem, q, residual, step, scale)
+        if not is_decreasing and step_length < _COARSE_STEP and _is_rounding(problem, q, residual):
             return q
     raise Unsettled(
         f"not converged after {iterations} iterations", residual / problem.sizes, problem
     )
 
 
-def _is_skew(slope: Array, scale: Array) -> bool:
+def _is_asymmetric(slope: Array, scale: Array) -> bool:
     root = np.sqrt(scale)
-    skew = np.abs(slope - slope.T) / np.outer(root, root)
-    return float(skew.max(initial=0.0)) > _SKEW
+    asymmetry = np.abs(slope - slope.T) / np.outer(root, root)
+    return float(asymmetry.max(initial=0.0)) > _MAX_ASYMMETRY
 
 
-def _scale(slope: Array, residual: Array, noise: Array | float = 0.0) -> Array:
+def _stiffness_scale(slope: Array, residual: Array, noise: Array | float = 0.0) -> Array:
     """Scale (n,) of the stiffness of each coordinate: the largest of K_ii, K_ij^2 / K_jj, effort.
 
     `noise` is the rounding error of K_jj.
     """
-    own = np.maximum(np.maximum(np.abs(np.diag(slope)), noise), 1e-300)
-    coupled = np.max(((slope + slope.T) / 2) ** 2 / own, axis=1, initial=0.0)
-    return np.maximum.reduce([own, coupled, np.abs(residual)])
+    diagonal = np.maximum(np.maximum(np.abs(np.diag(slope)), noise), 1e-300)
+    coupled = np.max(((slope + slope.T) / 2) ** 2 / diagonal, axis=1, initial=0.0)
+    return np.maximum.reduce([diagonal, coupled, np.abs(residual)])
 
 
-def _downhill(slope: Array, residual: Array, scale: Array, soft: float) -> Array:
+def _descent_step(slope: Array, residual: Array, scale: Array, soft: float) -> Array:
     """Newton step if the stiffness is positive definite, else a modified step of descent.
 
     In directions with negative or zero stiffness Newton's step would ascend or be too long; there
@@ -207,15 +217,15 @@ def _downhill(slope: Array, residual: Array, scale: Array, soft: float) -> Array
     potential this is only a heuristic).
     """
     root = np.sqrt(scale)
-    scaled, force = slope / np.outer(root, root), residual / root
-    values, directions = np.linalg.eigh((scaled + scaled.T) / 2)
+    scaled_stiffness, scaled_efforts = slope / np.outer(root, root), residual / root
+    values, directions = np.linalg.eigh((scaled_stiffness + scaled_stiffness.T) / 2)
     if values.min(initial=np.inf) > soft:
-        return np.asarray(np.linalg.solve(scaled, -force) / root)
+        return np.asarray(np.linalg.solve(scaled_stiffness, -scaled_efforts) / root)
     softened = np.maximum(np.abs(values), soft)
-    return np.asarray(-directions @ ((directions.T @ force) / softened) / root)
+    return np.asarray(-directions @ ((directions.T @ scaled_efforts) / softened) / root)
 
 
-def _along_the_path(slope: Array, residual: Array, scale: Array, _: float) -> Array:
+def _newton_step(slope: Array, residual: Array, scale: Array, _: float) -> Array:
     """Unmodified Newton step: the equilibrium for the previous load is near."""
     root = np.sqrt(scale)
     try:
@@ -224,7 +234,7 @@ def _along_the_path(slope: Array, residual: Array, scale: Array, _: float) -> Ar
         raise NumericalFailure("the stiffness is singular") from None
 
 
-def _followed(
+def _line_search(
     problem: Rest, q: Array, residual: Array, step: Array, scale: Array
 ) -> tuple[Array, Array, bool]:
     """Line search: q after the step, the efforts there, and whether they are smaller.
@@ -234,47 +244,52 @@ def _followed(
     not passed the minimum far unless the gradient along it has reversed to more than half its size.
     The efforts must also not grow much across a direction of little stiffness.
     """
-    step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _LONGEST)
-    before, along = _size(residual, scale), abs(float(residual @ step))
-    most = max(_MORE * before, _ASTRAY * float(np.sqrt(scale.max(initial=0.0))))
-    reached: tuple[Array, Array] | None = None
-    for _ in range(_HALVINGS):
+    step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _MAX_STEP)
+    size_before, work = _scaled_norm(residual, scale), abs(float(residual @ step))
+    max_size = max(
+        _MAX_EFFORT_GROWTH * size_before,
+        _MAX_EFFORT_MOTION * float(np.sqrt(scale.max(initial=0.0))),
+    )
+    last_valid: tuple[Array, Array] | None = None
+    for _ in range(_MAX_HALVINGS):
         try:
             trial = problem.after(q, step)
-            left = problem.efforts(trial)
+            efforts = problem.efforts(trial)
         except NumericalFailure:
-            step, along = step / 2, along / 2
+            step, work = step / 2, work / 2
             continue
-        reached = trial, left
-        after = _size(left, scale)
-        if after < before or (float(left @ step) <= along / 2 and after < most):
-            return trial, left, after < before
-        step, along = step / 2, along / 2
-    if reached is None:
+        last_valid = trial, efforts
+        size_after = _scaled_norm(efforts, scale)
+        if size_after < size_before or (
+            float(efforts @ step) <= work / 2 and size_after < max_size
+        ):
+            return trial, efforts, size_after < size_before
+        step, work = step / 2, work / 2
+    if last_valid is None:
         raise Unsettled("no step leads to another state", residual / problem.sizes, problem)
-    return *reached, False
+    return *last_valid, False
 
 
-def _size(residual: Array, scale: Array) -> float:
+def _scaled_norm(residual: Array, scale: Array) -> float:
     return float(np.linalg.norm(residual / np.sqrt(scale)))
 
 
 # --- rounding -------------------------------------------------------------------------------------
 
 
-def _noise(problem: Rest, q: Array) -> tuple[Array, Array]:
+def _stiffness_and_noise(problem: Rest, q: Array) -> tuple[Array, Array]:
     """Stiffness (n, n) in J, and the difference of two difference quotients of it."""
-    exact, fine = problem.exact_slope(q), problem.slope(q, _FINE)
+    exact, fine = problem.exact_slope(q), problem.slope(q, _FINE_STEP)
     return exact, np.abs(exact - fine)
 
 
 def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
     """True if the remaining efforts are rounding of larger ones that cancel."""
-    _, noise = _noise(problem, q)
-    return bool((np.abs(residual) <= 10 * _FINE * noise.max(axis=1, initial=0.0)).all())
+    _, noise = _stiffness_and_noise(problem, q)
+    return bool((np.abs(residual) <= 10 * _FINE_STEP * noise.max(axis=1, initial=0.0)).all())
 
 
-def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
+def unstable_coordinates(problem: Rest, q: Array) -> tuple[int, ...]:
     """Unstable coordinates of an equilibrium, by negative stiffness.
 
     Empty if efforts have no potential, because their stiffness then does not show stability.
@@ -283,25 +298,29 @@ def leaving(problem: Rest, q: Array) -> tuple[int, ...]:
     without stiffness the scale of another one may be so large that steps become short far from
     equilibrium.
     """
-    slope, noise = _noise(problem, q)
-    nothing = _NOTHING * float(np.abs(slope).max(initial=0.0))
-    scale = _scale(slope, np.zeros(len(slope)), np.maximum(np.diag(noise), nothing))
+    stiffness, noise = _stiffness_and_noise(problem, q)
+    rounding = _RELATIVE_ROUNDING * float(np.abs(stiffness).max(initial=0.0))
+    scale = _stiffness_scale(
+        stiffness, np.zeros(len(stiffness)), np.maximum(np.diag(noise), rounding)
+    )
     root = np.sqrt(scale)
-    both = (slope + slope.T) / 2
-    values, directions = np.linalg.eigh(both / np.outer(root, root))
+    symmetric_stiffness = (stiffness + stiffness.T) / 2
+    values, directions = np.linalg.eigh(symmetric_stiffness / np.outer(root, root))
     spread = np.abs(directions) / root[:, None]
-    unsure = 4 * np.einsum("ik,ij,jk->k", spread, noise, spread) + 1e-13
+    uncertainty = 4 * np.einsum("ik,ij,jk->k", spread, noise, spread) + 1e-13
 
     def moving(which: NDArray[np.bool_]) -> tuple[int, ...]:
         share = spread[:, which].max(axis=1, initial=0.0) * root
         return tuple(np.flatnonzero(share > 0.1).tolist())
 
-    loose = np.abs(values) <= unsure
-    if loose.any():
-        raise Undetermined(moving(loose), problem)
+    is_neutral = np.abs(values) <= uncertainty
+    if is_neutral.any():
+        raise Undetermined(moving(is_neutral), problem)
     residual = problem.efforts(q)
-    if np.abs(residual).max(initial=0.0) > len(slope) * _COARSE * np.abs(slope).max(initial=0.0):
+    if np.abs(residual).max(initial=0.0) > len(stiffness) * _COARSE_STEP * np.abs(stiffness).max(
+        initial=0.0
+    ):
         raise Unsettled(
             "steps become short far from equilibrium", residual / problem.sizes, problem
         )
-    return () if _is_skew(slope, scale) else moving(values < 0)
+    return () if _is_asymmetric(stiffness, scale) else moving(values < 0)

@@ -15,27 +15,27 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
 from .rest import Unsettled
-from .shifted_stiffness import ShiftedStiffness, Unsolved
+from .shifted_stiffness import ShiftedStiffness, SolutionIsRounding
 
 #: Default maximum number of steps.
-MOST = 2000
+MAX_STEPS = 2000
 #: Longest step and first step, in characteristic scales of the coordinates.
-_LONGEST, _FIRST = 0.5, 0.05
+_MAX_STEP, _FIRST_STEP = 0.5, 0.05
 #: Factors by which sigma decreases after a step of descent, and increases after a failed step.
-_EASED, _HELD = 4.0, 4.0
+_SIGMA_DECREASE, _SIGMA_INCREASE = 4.0, 4.0
 #: The search fails if sigma exceeds this multiple of its first value.
-_STUCK = 1e8
+_MAX_SIGMA_RATIO = 1e8
 #: Steps, in characteristic scales, below which efforts may be rounding; factor by which sigma
 #: decreases after steps within the tolerance; fraction of its first value that counts as zero.
-_ROUNDING, _DROPPED, _GONE = 1e-6, 64.0, 1e-20
+_ROUNDING_STEP, _SIGMA_FAST_DECREASE, _MIN_SIGMA_RATIO = 1e-6, 64.0, 1e-20
 #: Relative changes of q that reveal rounding, their number, and a safety factor.
-_NUDGE, _NUDGES, _MORE = 4e-16, 3, 10.0
+_PERTURBATION, _PERTURBATION_COUNT, _SAFETY_FACTOR = 4e-16, 3, 10.0
 #: Rounding of efforts, relative to those that cancel.
-_CANCELLED = 2e-16
+_CANCELLATION_ROUNDING = 2e-16
 
 
 class RestBySweep:
@@ -51,11 +51,11 @@ class RestBySweep:
         stiffness: ShiftedStiffness,
         settled: Callable[[Array], Array],
         load: float,
-        most: int = MOST,
+        most: int = MAX_STEPS,
         progress: Callable[[int, float], None] | None = None,
     ) -> None:
         self.stiffness, self.settled, self.most, self.progress = stiffness, settled, most, progress
-        self.cancelled = _CANCELLED * load  #: J, for tests with the smallest sigma
+        self.cancelled = _CANCELLATION_ROUNDING * load  #: J, for tests with the smallest sigma
         self.steps = 0  #: number of steps of the last search
         self._least = 0.0  # smallest sigma with which solutions are no rounding
 
@@ -65,35 +65,35 @@ class RestBySweep:
         Raises Unsettled with the missing efforts (nu,) after `most` steps.
         """
         self.steps, q = 0, self.settled(q)
-        missing, near = self.stiffness.residual(q), False
-        if self._is_rounding(q, missing):
+        missing_efforts, is_near = self.stiffness.residual(q), False
+        if self._is_rounding(q, missing_efforts):
             return q
-        sigma = first = self._unrest(q) / _FIRST
-        self._least = _GONE * sigma
+        sigma = first_sigma = self._unrest(q) / _FIRST_STEP
+        self._least = _MIN_SIGMA_RATIO * sigma
         for k in range(self.most):
-            if sigma > _STUCK * first:
-                raise Unsettled(f"after {k} steps no further step leads on", missing)
-            step = self._step(missing, sigma, tolerance)
-            length = np.inf if step is None else self.stiffness.length(step)
+            if sigma > _MAX_SIGMA_RATIO * first_sigma:
+                raise Unsettled(f"after {k} steps no further step leads on", missing_efforts)
+            step = self._step(missing_efforts, sigma, tolerance)
+            step_length = np.inf if step is None else self.stiffness.length(step)
             if self.progress is not None:
-                self.progress(k, length)
-            if step is None and near:
+                self.progress(k, step_length)
+            if step is None and is_near:
                 return q  # sigma is negligible
-            if length < _ROUNDING and self._is_rounding(q, missing):
+            if step_length < _ROUNDING_STEP and self._is_rounding(q, missing_efforts):
                 return q
-            if sigma <= self._least and self._is_rounding(q, missing, self.cancelled):
+            if sigma <= self._least and self._is_rounding(q, missing_efforts, self.cancelled):
                 return q  # directions without stiffness move by rounding only
-            ahead = None if step is None else self._ahead(q, step, missing)
-            if ahead is None:
-                sigma *= _HELD
-                missing = self.stiffness.residual(q)
+            next_state = None if step is None else self._ahead(q, step, missing_efforts)
+            if next_state is None:
+                sigma *= _SIGMA_INCREASE
+                missing_efforts = self.stiffness.residual(q)
                 continue
-            self.steps, (q, missing) = self.steps + 1, ahead
-            near = length <= tolerance and sigma <= first
-            if near and sigma <= self._least:
+            self.steps, (q, missing_efforts) = self.steps + 1, next_state
+            is_near = step_length <= tolerance and sigma <= first_sigma
+            if is_near and sigma <= self._least:
                 return q
-            sigma = max(sigma / (_DROPPED if near else _EASED), self._least)
-        raise Unsettled(f"not at rest after {self.most} steps", missing)
+            sigma = max(sigma / (_SIGMA_FAST_DECREASE if is_near else _SIGMA_DECREASE), self._least)
+        raise Unsettled(f"not at rest after {self.most} steps", missing_efforts)
 
     def _step(self, missing: Array, sigma: float, tolerance: float) -> Array | None:
         """Step from the state of the last residual, at most _LONGEST long.
@@ -104,15 +104,15 @@ class RestBySweep:
         try:
             stiffness.factor(sigma)
             step = -stiffness.solve(missing)
-        except Unsolved:
-            self._least = _HELD * sigma
+        except SolutionIsRounding:
+            self._least = _SIGMA_INCREASE * sigma
             return None
         except NumericalFailure:
             return None
         length = stiffness.length(step)
         if length > tolerance and stiffness.tangent.count_negative():
             return None
-        return step / max(1.0, length / _LONGEST)
+        return step / max(1.0, length / _MAX_STEP)
 
     def _ahead(self, q: Array, step: Array, missing: Array) -> tuple[Array, Array] | None:
         """State q after a step, and the missing efforts there.
@@ -121,30 +121,33 @@ class RestBySweep:
         tangent must be that of q: it converts a motion to a change of coordinates.
         """
         try:
-            ahead = self.settled(q + self.stiffness.tangent.coordinates(step))
-            left = self.stiffness.residual(ahead)
+            next_q = self.settled(q + self.stiffness.tangent.coordinates(step))
+            next_efforts = self.stiffness.residual(next_q)
         except NumericalFailure:
             return None
-        if self.stiffness.length(step) >= _ROUNDING:
-            begun = float(missing @ step)
-            if not begun < 0 or not float(left @ step) <= -0.5 * begun:
+        if self.stiffness.length(step) >= _ROUNDING_STEP:
+            initial_work = float(missing @ step)
+            if not initial_work < 0 or not float(next_efforts @ step) <= -0.5 * initial_work:
                 return None
-        return ahead, left
+        return next_q, next_efforts
 
     def _is_rounding(self, q: Array, missing: Array, cancelled: float = 0.0) -> bool:
         """True if the missing efforts are rounding of q, or of cancelling efforts (J)."""
-        draw, noise = np.random.default_rng(0), cancelled / _MORE / self.stiffness.sizes
-        for _ in range(_NUDGES):
-            nudged = q * (1 + _NUDGE * draw.uniform(-1.0, 1.0, len(q)))
-            noise = np.maximum(noise, np.abs(self.stiffness.residual(nudged) - missing))
+        random_generator, noise = (
+            np.random.default_rng(0),
+            cancelled / _SAFETY_FACTOR / self.stiffness.sizes,
+        )
+        for _ in range(_PERTURBATION_COUNT):
+            perturbed_q = q * (1 + _PERTURBATION * random_generator.uniform(-1.0, 1.0, len(q)))
+            noise = np.maximum(noise, np.abs(self.stiffness.residual(perturbed_q) - missing))
         self.stiffness.residual(q)
-        return bool((np.abs(missing) <= _MORE * noise).all())
+        return bool((np.abs(missing) <= _SAFETY_FACTOR * noise).all())
 
     def _unrest(self, q: Array) -> float:
         """Largest acceleration in characteristic scales."""
-        tangent, still = self.stiffness.tangent, self.stiffness.still
-        one = np.array([self.stiffness.t]), q[None], still[None], tangent.memory[None]
-        largest = self.stiffness.length(tangent.engine.accelerations(*one)[1][0])
-        if not np.isfinite(largest):
+        tangent, zero_speeds = self.stiffness.tangent, self.stiffness.still
+        state = np.array([self.stiffness.t]), q[None], zero_speeds[None], tangent.memory[None]
+        max_acceleration = self.stiffness.length(tangent.engine.accelerations(*state)[1][0])
+        if not np.isfinite(max_acceleration):
             raise NumericalFailure("the accelerations of this state are not finite")
-        return largest
+        return max_acceleration

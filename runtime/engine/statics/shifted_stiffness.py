@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ..tangent import Tangent
+from ..tangent_matrix import TangentMatrix
 
 #: Relative change of a solution at which refinement ends, and maximum number of refinements.
-_SMALL, _REFINEMENTS = 1e-4, 3
+_CONVERGED_CHANGE, _MAX_REFINEMENTS = 1e-4, 3
 
 
-class Unsolved(NumericalFailure):
+class SolutionIsRounding(NumericalFailure):
     """Failure: with so small a sigma solutions are rounding."""
 
 
@@ -28,15 +28,21 @@ class ShiftedStiffness:
     `sizes` (nu,) are the characteristic scales of the speeds.
     """
 
-    def __init__(self, tangent: Tangent, t: float, sizes: Array) -> None:
+    def __init__(self, tangent: TangentMatrix, t: float, sizes: Array) -> None:
         self.tangent, self.t, self.sizes, self.sigma = tangent, t, sizes, 0.0
         self.still, self.placed = np.zeros(tangent.nu), np.zeros(tangent.nq)
         tangent.allow_negative()
         tangent.record.rows_of_motion = 1
-        system, first = tangent.engine.packed.system, tangent.engine.packed.system.places["u"]
-        own = [first[one.frame] + np.arange(system.body(one.frame).nu) for one in system.closures]
+        system, first_speeds = (
+            tangent.engine.packed.system,
+            tangent.engine.packed.system.places["u"],
+        )
+        closing_speeds = [
+            first_speeds[closure.frame] + np.arange(system.body(closure.frame).nu)
+            for closure in system.closures
+        ]
         #: Speeds of hinges that close loops, which follow the others.
-        self.own = np.concatenate([np.zeros(0, np.int64), *own])
+        self.own = np.concatenate([np.zeros(0, np.int64), *closing_speeds])
 
     def residual(self, q: Array) -> Array:
         """Efforts R (nu,) that equilibrium lacks at q, to which all other calls refer then."""
@@ -53,14 +59,14 @@ class ShiftedStiffness:
         Raises Unsolved if the solution is rounding.
         """
         x = self.tangent.solve(efforts)
-        for _ in range(_REFINEMENTS):
-            left = efforts - self._along(self.tangent.coordinates(x), self.sigma * x)
-            change = self.tangent.solve(left)
+        for _ in range(_MAX_REFINEMENTS):
+            residual_efforts = efforts - self._along(self.tangent.coordinates(x), self.sigma * x)
+            change = self.tangent.solve(residual_efforts)
             x = x + change
-            changed, whole = self.length(change), self.length(x)
-            if changed <= _SMALL * whole:
+            change_size, solution_size = self.length(change), self.length(x)
+            if change_size <= _CONVERGED_CHANGE * solution_size:
                 return x
-        raise Unsolved("the stiffness is rounding here")
+        raise SolutionIsRounding("the stiffness is rounding here")
 
     def press(self, x: Array) -> Array:
         """Product K x (nu,)."""

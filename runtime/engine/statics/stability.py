@@ -16,25 +16,25 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
 from .shifted_stiffness import ShiftedStiffness
 
 #: Vectors of one sequence, and relative remainder of a vector that depends on others.
-_VECTORS, _NOTHING = 16, 1e-10
+_MAX_VECTORS, _MIN_REMAINDER = 16, 1e-10
 #: Successive sigma relative to the largest kappa; eigenvalues kappa beyond _SEEN sigma are rounding
 #: of a sequence.  Kappa up to _SOFT of the largest may be zero; unless they are rounding, these
 #: agree with the stiffness of their motions to _ALIKE, others to _NEAR.
 _SHIFTS = tuple(10.0**-k for k in range(0, 13, 2))
-_SEEN = 1e3
-_SOFT, _ALIKE, _NEAR = 1e-10, 1e-2, 0.5
+_MAX_KAPPA_RATIO = 1e3
+_NEUTRAL_RATIO, _SOFT_AGREEMENT, _MIN_AGREEMENT = 1e-10, 1e-2, 0.5
 #: A sigma with which the stiffness is negligible, and number of powers of W^-1 K.
-_ALONE, _POWERS = 1e200, 6
+_LARGE_SIGMA, _POWER_STEPS = 1e200, 6
 #: Relative changes of q that reveal rounding of a stiffness, their number, and a safety factor.
-_NUDGE, _NUDGES, _MORE = 1e-14, 2, 10.0
+_PERTURBATION, _PERTURBATION_COUNT, _SAFETY_FACTOR = 1e-14, 2, 10.0
 #: Relative asymmetry above which a stiffness has no potential.
-_SKEW = 1e-4
+_MAX_ASYMMETRY = 1e-4
 
 
 @dataclass(frozen=True)
@@ -51,39 +51,43 @@ class Stability:
 
 def find_stability(stiffness: ShiftedStiffness, q: Array) -> Stability:
     """Find the unstable and neutral motions of an equilibrium q (nq,)."""
-    return _Search(stiffness).at(q)
+    return _StabilitySearch(stiffness).at(q)
 
 
-class _Search:
+class _StabilitySearch:
     def __init__(self, stiffness: ShiftedStiffness) -> None:
         self.stiffness = stiffness
 
     def at(self, q: Array) -> Stability:
         self.stiffness.residual(q)
         largest = self._largest() or 1.0
-        unstable, neutral, skewed = list[Array](), list[Array](), False
+        unstable, neutral, is_skew = list[Array](), list[Array](), False
         for sigma in (largest * np.array(_SHIFTS)).tolist():
-            found, skew = self._softest(sigma, _SOFT * largest)
-            skewed |= skew
-            for kappa, motion in found:
-                own, noise = self._stiffness(q, motion)
-                soft = abs(kappa) <= _SOFT * largest
-                sure = abs(own - kappa) <= (_ALIKE if soft else _NEAR) * abs(own) > noise
-                if sure and own < 0:
+            soft_motions, is_matrix_skew = self._softest(sigma, _NEUTRAL_RATIO * largest)
+            is_skew |= is_matrix_skew
+            for kappa, motion in soft_motions:
+                stiffness, noise = self._stiffness(q, motion)
+                is_soft = abs(kappa) <= _NEUTRAL_RATIO * largest
+                is_certain = (
+                    abs(stiffness - kappa)
+                    <= (_SOFT_AGREEMENT if is_soft else _MIN_AGREEMENT) * abs(stiffness)
+                    > noise
+                )
+                if is_certain and stiffness < 0:
                     unstable.append(motion)
-                elif not sure and (soft or abs(own) <= noise):
+                elif not is_certain and (is_soft or abs(stiffness) <= noise):
                     neutral.append(motion)
-        return Stability([] if skewed else unstable, neutral)
+        return Stability([] if is_skew else unstable, neutral)
 
     def _largest(self) -> float:
         """Magnitude of the largest kappa, by a few powers of W^-1 K."""
-        self.stiffness.factor(_ALONE)
+        self.stiffness.factor(_LARGE_SIGMA)
         motion, size = self._drawn(), 0.0
-        for _ in range(_POWERS):
-            before = self._size(motion)
-            if not before > 0:
+        for _ in range(_POWER_STEPS):
+            norm = self._size(motion)
+            if not norm > 0:
                 break
-            motion = _ALONE * self.stiffness.solve(self.stiffness.press(motion / before))
+            motion = _LARGE_SIGMA * self.stiffness.solve(self.stiffness.press(motion / norm))
             size = self._size(motion)
         return size
 
@@ -93,8 +97,8 @@ class _Search:
 
     def _drawn(self) -> Array:
         """Random motion that loops permit, by the present factorisation."""
-        draw = np.random.default_rng(0).standard_normal(len(self.stiffness.still))
-        motion = self.stiffness.solve(draw)
+        random_efforts = np.random.default_rng(0).standard_normal(len(self.stiffness.still))
+        motion = self.stiffness.solve(random_efforts)
         return np.asarray(motion / (float(np.abs(motion).max(initial=0.0)) or 1.0))
 
     def _softest(self, sigma: float, soft: float) -> tuple[list[tuple[complex, Array]], bool]:
@@ -107,43 +111,50 @@ class _Search:
             return [], False
         with np.errstate(all="ignore"):
             kappas = 1.0 / values - sigma
-        skew = np.abs(matrix - matrix.T).max(initial=0.0) > _SKEW * np.abs(matrix).max(initial=0.0)
-        found = [
+        skew = np.abs(matrix - matrix.T).max(initial=0.0) > _MAX_ASYMMETRY * np.abs(matrix).max(
+            initial=0.0
+        )
+        motions = [
             (complex(kappa), (basis.T @ vector).real)
             for kappa, vector in zip(kappas, vectors.T, strict=True)
-            if kappa.real <= soft and abs(kappa) < _SEEN * sigma
+            if kappa.real <= soft and abs(kappa) < _MAX_KAPPA_RATIO * sigma
         ]  # fmt: skip
-        return found, bool(skew)
+        return motions, bool(skew)
 
     def _sequence(self) -> tuple[Array, Array]:
         """Motions (m, nu), orthonormal with W, and (K + sigma W)^-1 W (m, m) in their basis."""
-        basis, pushed, matrix = list[Array](), list[Array](), np.zeros((_VECTORS + 1, _VECTORS))
+        basis, inertia_products, matrix = (
+            list[Array](),
+            list[Array](),
+            np.zeros((_MAX_VECTORS + 1, _MAX_VECTORS)),
+        )
         motion, size = self._drawn(), 1.0
-        for k in range(_VECTORS + 1):
+        for k in range(_MAX_VECTORS + 1):
             for _ in range(2 if k else 0):
-                shares = np.array(pushed) @ motion
-                matrix[:k, k - 1] += shares
-                motion = motion - shares @ np.array(basis)
+                components = np.array(inertia_products) @ motion
+                matrix[:k, k - 1] += components
+                motion = motion - components @ np.array(basis)
             inertia = self.stiffness.inertia(motion)
-            left = math.sqrt(max(0.0, float(motion @ inertia)))
-            if k == _VECTORS or not left > _NOTHING * size:
+            remainder = math.sqrt(max(0.0, float(motion @ inertia)))
+            if k == _MAX_VECTORS or not remainder > _MIN_REMAINDER * size:
                 break
-            matrix[k, max(k - 1, 0)] += left if k else 0.0
-            basis.append(motion / left)
-            pushed.append(inertia / left)
-            motion = self.stiffness.solve(pushed[-1])
+            matrix[k, max(k - 1, 0)] += remainder if k else 0.0
+            basis.append(motion / remainder)
+            inertia_products.append(inertia / remainder)
+            motion = self.stiffness.solve(inertia_products[-1])
             size = self._size(motion)
         n = len(basis)
         return np.array(basis).reshape(n, len(motion)), matrix[:n, :n]
 
     def _stiffness(self, q: Array, motion: Array) -> tuple[float, float]:
         """Stiffness of a motion relative to its inertia, and its error by rounding of q."""
-        draw, found = np.random.default_rng(0), list[float]()
-        for k in range(1 + _NUDGES):
+        random_generator, values = np.random.default_rng(0), list[float]()
+        for k in range(1 + _PERTURBATION_COUNT):
             self.stiffness.residual(
-                q * (1 + (_NUDGE if k else 0.0) * draw.uniform(-1.0, 1.0, len(q)))
+                q
+                * (1 + (_PERTURBATION if k else 0.0) * random_generator.uniform(-1.0, 1.0, len(q)))
             )
-            found.append(
+            values.append(
                 float(
                     motion
                     @ self.stiffness.press(motion)
@@ -151,5 +162,5 @@ class _Search:
                 )
             )
         self.stiffness.residual(q)
-        noise = max(abs(one - found[0]) for one in found[1:])
-        return found[0], _MORE * noise
+        noise = max(abs(value - values[0]) for value in values[1:])
+        return values[0], _SAFETY_FACTOR * noise

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
 from .rest import Rest

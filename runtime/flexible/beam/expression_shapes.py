@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.expression.expression import Expression, Name
+from mstmm.ir.differentiation import derivative
 from mstmm.ir.graph import Graph, Node
-from mstmm.ir.tangent import derivative
 
 #: Operations that numpy has under another name than the expressions' own meaning.
 _VECTORISED: dict[str, Any] = {

@@ -15,10 +15,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ..parts import slices
-from . import kernels
+from ..memory_chunks import slices
+from . import beam_kernels
 
 
 class Term(NamedTuple):
@@ -36,7 +36,7 @@ Terms: TypeAlias = Mapping[tuple[int, ...], tuple[Term, ...]]
 def terms(kernel: str, *groups: tuple[str, ...]) -> Mapping[str, Terms]:
     """The terms of every output of a kernel that is linear in each group of its inputs; entries are
     counted through the inputs of a group."""
-    widths = [[kernels.rows(kernel, name) for name in group] for group in groups]
+    widths = [[beam_kernels.rows(kernel, name) for name in group] for group in groups]
     extents = [sum(width) + 1 for width in widths]  # the zero vector, then the units
     chosen = np.indices(extents).reshape(len(groups), -1)
     inputs: dict[str, Array] = {}
@@ -44,7 +44,7 @@ def terms(kernel: str, *groups: tuple[str, ...]) -> Mapping[str, Terms]:
         units = np.eye(extent)[1:, which]
         inputs |= zip(group, np.split(units, np.cumsum(width)[:-1]), strict=True)
     found = {}
-    for name, values in kernels.evaluate(kernel, inputs).items():
+    for name, values in beam_kernels.evaluate(kernel, inputs).items():
         factors = values.reshape(*values.shape[:-1], *extents)
         for axis in range(-len(groups), 0):
             along = np.moveaxis(factors, axis, 0)

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from mstmm.scene.rules.values import split
+from mstmm.scene.validators.scalars_and_vectors import split_reference
 
-from .planar import Planar
+from .planar_motion import PlanarMotionCheck
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
@@ -31,12 +31,13 @@ def restrained_beams(scene: Scene) -> frozenset[str]:
     """Names of the beams whose length the rest of the scene holds."""
     hinges = [Edge((h.inboard_body, h.outboard_body), h) for h in scene.hinge]
     constraints = [
-        Edge((split(c.from_)[0], split(c.to)[0]), None, c.rows) for c in scene.constraint
+        Edge((split_reference(c.from_)[0], split_reference(c.to)[0]), None, c.rows)
+        for c in scene.constraint
     ]
     beams = {beam.name for beam in scene.beam if any(s.axial_stiffness for s in beam.sections)}
     if not beams or len(hinges) + len(constraints) <= len(scene.skeleton.body):
         return frozenset()
-    plane, found = Planar(scene), set[str]()
+    plane, found = PlanarMotionCheck(scene), set[str]()
     for block in blocks([*hinges, *constraints]):
         bodies = {end for edge in block for end in edge.ends}
         loops = len(block) - len(bodies) + 1
@@ -46,7 +47,7 @@ def restrained_beams(scene: Scene) -> frozenset[str]:
     return frozenset(found)
 
 
-def _mobility(plane: Planar, beam: str, block: list[Edge], loops: int) -> int:
+def _mobility(plane: PlanarMotionCheck, beam: str, block: list[Edge], loops: int) -> int:
     """Motions of the block by count, in a plane of the beam if all its hinges stay in it."""
     hinges = [edge.hinge for edge in block if edge.hinge is not None]
     in_plane = not plane.possible or any(plane.stay(beam, axis, hinges) for axis in (1, 2))

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ..parts import slices
-from .rates import Rates
+from ..memory_chunks import slices
+from .second_order_rates import Rates
 
 if TYPE_CHECKING:
-    from .frame import Frame
+    from .frame_location import Frame
     from .shape_fields import ShapeFields
 
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from . import kernels as beam_kernels
-from .data import BeamData, BeamSections
-from .gauss import density_of, gauss_between
-from .shapes import Shape
+from . import beam_kernels
+from .beam_data import BeamData, BeamSections
+from .gauss_quadrature import density_of, gauss_between
+from .shape_functions import Shape
 
 #: Directions in the order of the modal coordinates.
 DIRECTIONS = ("y", "z", "twist", "axial")

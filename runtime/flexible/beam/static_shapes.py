@@ -12,10 +12,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from .data import BeamData
-from .shapes import Piecewise
+from .beam_data import BeamData
+from .shape_functions import Piecewise
 
 #: Row of `BeamData.stiffness` per direction.
 _STIFFNESS = {"axial": 0, "twist": 1, "z": 2, "y": 3}

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 from ..resolution import resolved_frequency, ritz_frequencies
-from .model import ElasticModel
-from .ports import Port
-from .sections import Clamped, Sections, moved_to
+from .finite_element_model import ElasticModel
+from .interface_nodes import Port
+from .interface_reduction import Clamped, Sections, moved_to
 
 FRAMES = ("tangent", "mean")
 
@@ -119,7 +119,7 @@ def reduce(
         )
     if frame == "mean":
         shapes = without_momentum(model, shapes)
-    shapes, frequencies = orthogonalised(model, shapes)
+    shapes, frequencies = orthogonalise(model, shapes)
     kept = frequencies <= (np.inf if highest is None else highest)
     if not kept.any():
         raise model.refuse(
@@ -273,7 +273,7 @@ def without_momentum(model: ElasticModel, shapes: Array) -> Array:
     return np.asarray(shapes - model.rigid @ parts)
 
 
-def orthogonalised(model: ElasticModel, shapes: Array) -> tuple[Array, Array]:
+def orthogonalise(model: ElasticModel, shapes: Array) -> tuple[Array, Array]:
     """Shapes with diagonal mass and stiffness, modal mass that of the body, and frequencies."""
     from scipy import linalg
 

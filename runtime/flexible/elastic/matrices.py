@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.scene.rules.messages import near
+from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ...host.files import read_arrays, refuse_special, replacing
-from .model import ElasticModel
+from ...platform_support.safe_files import read_arrays, replace_atomically, require_regular_file
+from .finite_element_model import ElasticModel
 
 _MATRICES = ("mass", "stiffness", "scalar_mass")
 _PARTS = ("data", "indices", "indptr")
@@ -41,7 +41,7 @@ def save_matrices(
     for key, matrix in zip(_MATRICES, (mass, stiffness, scalar_mass), strict=True):
         if matrix is not None:
             arrays |= _written(key, matrix)
-    with replacing(Path(path)) as temporary, temporary.open("wb") as file:
+    with replace_atomically(Path(path)) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
     return Path(path)
 
@@ -64,7 +64,9 @@ def load_matrices(path: Path, where: str) -> ElasticModel:
     arrays = _arrays(path, where)
     for key in arrays:
         if key not in _KEYS:
-            raise SceneError(f"{where}: {path.name} has an unknown array {key!r}{near(key, _KEYS)}")
+            raise SceneError(
+                f"{where}: {path.name} has an unknown array {key!r}{did_you_mean(key, _KEYS)}"
+            )
     order = str(arrays.pop("order", "node"))
     if order not in _ORDERS:
         raise SceneError(
@@ -79,7 +81,7 @@ def load_matrices(path: Path, where: str) -> ElasticModel:
 
 def _arrays(path: Path, where: str) -> dict[str, Any]:
     way_out = "write it with mstmm.runtime.flexible.elastic.save_matrices"
-    refuse_special(path, where)
+    require_regular_file(path, where)
     try:
         return read_arrays(path)
     except FileNotFoundError:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.extras import missing
+from mstmm.optional_packages import missing_package_error
 
-from ...host.files import refuse_special
-from .mesh_references import refuse_outside
-from .model import ElasticModel
-from .skin import outside
+from ...platform_support.safe_files import require_regular_file
+from .finite_element_model import ElasticModel
+from .mesh_file_references import refuse_outside
+from .surface_mesh import outside
 
 #: Cells of solids as meshio calls them, and the mesh that scikit-fem makes of them.
 SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
@@ -53,7 +53,7 @@ def _library(what: str) -> Any:
     try:
         import skfem
     except ImportError as error:
-        raise missing("fem", what, error) from None
+        raise missing_package_error("fem", what, error) from None
     return skfem
 
 
@@ -72,13 +72,13 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
     Raises SceneError for a file that is no mesh, has no solid cells or several kinds of them,
     EnvironmentFailure without the extra.
     """
-    refuse_special(path, where)
+    require_regular_file(path, where)
     skfem = _library("a mesh")
     try:
         import meshio
         from skfem.io.meshio import from_meshio
     except ImportError as error:
-        raise missing("fem", "a mesh", error) from None
+        raise missing_package_error("fem", "a mesh", error) from None
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
     refuse_outside(path, where)

@@ -1,4 +1,4 @@
-/* Private declarations of lanes.c and lanes_step.c. */
+/* Private declarations of simd_lanes.c and lanes_step.c. */
 #ifndef MSTMM_LANES_STEP_H
 #define MSTMM_LANES_STEP_H
 

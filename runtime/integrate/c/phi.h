@@ -16,7 +16,7 @@ typedef struct mstmm_phi {
   double *scale;   /* a row: powers of two that balance X */
   double *matrix;  /* n rows: X / 2^levels, balanced */
   double *powers;  /* n rows a level: the exponential of 2^j times that, less 1 */
-  double *moved;   /* 6 rows a level, and one more: the phi times the c, see phi.c */
+  double *moved;   /* 6 rows a level, and one more: the phi times the c, see phi_functions.c */
   double *forces;  /* 3 rows: the c, balanced, in the units of a first step */
   double *scratch; /* 5 n rows */
 } mstmm_phi;

@@ -7,7 +7,7 @@
 
 #include "integrate.h"
 #include "phi.h"
-#include "wide.h"
+#include "four_lanes.h"
 
 #define MSTMM_DEPTH 40 /* times that a part of a step is halved in search of an event */
 #define MSTMM_SAME_STEP 1e-9 /* relative difference of two steps that are of one length */
@@ -28,7 +28,7 @@ typedef struct mstmm_work {
   double *y_new, *y_stage, *y_event; /* a row each */
   double *dense;                     /* n_dense rows */
   double *atol;                      /* a row: the tolerances, 0 where there are none */
-  double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see iterate.c */
+  double *lanes_y, *lanes_k;         /* iterated methods: 8 rows each, see iterated_runge_kutta.c */
   double *g_before, *g_left, *g_right, *g_trial; /* events and switches */
   double *memory;                                /* n_memory: saved while an event is tried */
   int64_t seen_row;
@@ -37,13 +37,13 @@ typedef struct mstmm_work {
   mstmm_bounds *bounds, *first_bounds; /* events and switches */
   /* Implicit methods, NULL and empty for others.  Rows of the state are longer then: the n_state
    * components are followed by the accelerations, and in Newmark's family by other data for the
-   * next step, see alpha.c. */
+   * next step, see newmark_family.c. */
   const mstmm_implicit *implicit;
   double *base;                /* a row, kept: where the tangent of Newton's iteration was taken */
   double *y_star, *y_first, *error; /* a row each */
   double *residual, *residual_rate, *rho_u, *du, *da; /* n_u each */
   double *rho_q, *dq;          /* n_q each */
-  double *map_q, *map_u;       /* n_u each: what is known of the step, see alpha.c */
+  double *map_q, *map_u;       /* n_u each: what is known of the step, see newmark_family.c */
   double *flow;                /* 3 n_q */
   double *nodes;               /* quadratures at the ends and nodes of a step */
   /* Exponential methods; n = n_q + n_u */

@@ -13,8 +13,8 @@ from importlib import import_module
 
 from mstmm.errors import SceneError
 
-from .implicit import on_positions
-from .tableau import Tableau, from_monomials, frozen, hermite
+from .implicit_methods import with_position_constraints
+from .tableau import Tableau, from_monomials, hermite, to_read_only
 
 __all__ = [
     "AUTO",
@@ -23,20 +23,20 @@ __all__ = [
     "EXPLICIT",
     "EXPLICIT_METHODS",
     "IMPLICIT",
-    "ON_POSITIONS",
+    "INDEX3_SUFFIX",
+    "METHODS_WITH_RADIUS",
     "TANGENTS",
-    "WITH_RADIUS",
     "Tableau",
     "check_radius",
     "check_size",
     "check_steps",
     "check_tangent",
     "from_monomials",
-    "frozen",
     "get",
     "hermite",
     "names",
     "register",
+    "to_read_only",
 ]
 
 EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
@@ -51,19 +51,19 @@ BUILT_IN = EXPLICIT + IMPLICIT
 EXPLICIT_METHODS = f"{', '.join(EXPLICIT[:-1])} or {EXPLICIT[-1]}"
 
 #: Methods whose spectral radius at infinity a run may choose.
-WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")
+METHODS_WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")
 
 #: Suffix of methods that satisfy the position constraints of closed loops at the end of a step;
 #: the others satisfy those of accelerations and project the state after each step.
-ON_POSITIONS = "-index3"
+INDEX3_SUFFIX = "-index3"
 
 #: Tangents of the equations of motion for implicit methods, in the order of the C loop's numbers:
 #: auto is the exact one for Rosenbrock methods; iterations first try that of inertia and laws.
 TANGENTS = ("auto", "exact", "laws")
 
 #: Rosenbrock methods whose order does not depend on the tangent, and methods that iterate.
-WITHOUT_EXACT = ("ros34pw2", "rodas4pw")
-ITERATED = (
+W_METHODS = ("ros34pw2", "rodas4pw")
+ITERATED_METHODS = (
     "esdirk436", "kvaerno5", "genalpha", "hht", "newmark", "wilson", "houbolt", "genalpha-index3",
     "hht-index3",
 )  # fmt: skip
@@ -71,13 +71,13 @@ ITERATED = (
 #: Name of the automatic choice of a method, and the method with which it starts.
 AUTO, AUTO_EXPLICIT = "auto", "dop853"
 
-_registered: dict[str, Tableau] = {}
+_registered_methods: dict[str, Tableau] = {}
 
 
 @cache
 def _built_in(name: str, radius: float | None = None) -> Tableau:
-    if name.endswith(ON_POSITIONS):
-        return on_positions(_built_in(name.removesuffix(ON_POSITIONS), radius), name)
+    if name.endswith(INDEX3_SUFFIX):
+        return with_position_constraints(_built_in(name.removesuffix(INDEX3_SUFFIX), radius), name)
     module = import_module(f".{name}", __name__)
     tableau: Tableau = module.tableau() if radius is None else module.tableau(radius)
     return tableau
@@ -91,23 +91,23 @@ def register(tableau: Tableau) -> None:
     """
     if tableau.name in (AUTO, *names()):
         raise ValueError(f"a method named {tableau.name!r} exists already")
-    _registered[tableau.name] = tableau
+    _registered_methods[tableau.name] = tableau
 
 
 def names() -> tuple[str, ...]:
     """Names of all methods that `get` accepts."""
-    return (*BUILT_IN, *_registered)
+    return (*BUILT_IN, *_registered_methods)
 
 
 def check_damped(name: str, radius: float | None) -> None:
     """Raise SceneError for methods with position constraints (index 3) and no damping."""
-    if name != f"newmark{ON_POSITIONS}" and not (name.endswith(ON_POSITIONS) and radius == 1.0):
+    if name != f"newmark{INDEX3_SUFFIX}" and not (name.endswith(INDEX3_SUFFIX) and radius == 1.0):
         return
-    given = f'method "{name}"' if radius is None else f'radius = {radius:g}: method "{name}"'
+    label = f'method "{name}"' if radius is None else f'radius = {radius:g}: method "{name}"'
     raise SceneError(
-        f"{given} would have no damping, and errors of multipliers, which with position "
+        f"{label} would have no damping, and errors of multipliers, which with position "
         "constraints are proportional to 1/step^2, would grow from step to step; use "
-        f"genalpha{ON_POSITIONS} with a radius below 1, or {name.removesuffix(ON_POSITIONS)}, "
+        f"genalpha{INDEX3_SUFFIX} with a radius below 1, or {name.removesuffix(INDEX3_SUFFIX)}, "
         "which uses constraints of accelerations"
     )
 
@@ -122,10 +122,10 @@ def check_radius(name: str, radius: float | None) -> None:
         return
     if not 0.0 <= radius <= 1.0:
         raise SceneError(f"radius = {radius:g}: expected a spectral radius from 0 to 1")
-    if name not in WITH_RADIUS:
+    if name not in METHODS_WITH_RADIUS:
         raise SceneError(
             f'radius = {radius:g}: method "{name}" has no such parameter; methods with a radius '
-            "are " + ", ".join(WITH_RADIUS)
+            "are " + ", ".join(METHODS_WITH_RADIUS)
         )
 
 
@@ -143,9 +143,10 @@ def check_steps(tableau: Tableau, step: float | None) -> None:
     """Raise SceneError for a method without an error estimate if no step is given."""
     if step is not None or tableau.adaptive:
         return
-    kin = "genalpha" if tableau.implicit else "dopri5"
+    suggested_method = "genalpha" if tableau.implicit else "dopri5"
     raise SceneError(
-        f'method "{tableau.name}" takes fixed steps: give step in s, or use {kin}, which chooses '
+        f'method "{tableau.name}" takes fixed steps: give step in s, or use {suggested_method}, '
+        f"which chooses "
         "its steps by their error"
     )
 
@@ -153,17 +154,17 @@ def check_steps(tableau: Tableau, step: float | None) -> None:
 def check_tangent(name: str, tangent: str) -> None:
     """Raise SceneError for an unknown tangent, or one with which a method loses its order."""
     if tangent not in TANGENTS:
-        known = ", ".join(TANGENTS)
-        raise SceneError(f'tangent = "{tangent}": expected one of {known}')
+        tangent_names = ", ".join(TANGENTS)
+        raise SceneError(f'tangent = "{tangent}": expected one of {tangent_names}')
     if tangent == TANGENTS[0] or (tangent == "exact" and name in IMPLICIT):
         return
-    able = (*WITHOUT_EXACT, *ITERATED)
-    if name in able:
+    methods_without_exact = (*W_METHODS, *ITERATED_METHODS)
+    if name in methods_without_exact:
         return
     if name in IMPLICIT:
         raise SceneError(
             f'tangent = "{tangent}": {name} has a low order without the exact tangent (rodas4 the '
-            f"first); methods that do not need it are {', '.join(able)}"
+            f"first); methods that do not need it are {', '.join(methods_without_exact)}"
         )
     raise SceneError(
         f'tangent = "{tangent}": method "{name}" has no tangent to choose; methods with a tangent '
@@ -185,11 +186,11 @@ def get(name: str, radius: float | None = None) -> Tableau:
     check_radius(name, radius)
     if name in BUILT_IN:
         return _built_in(name, radius)
-    if name not in _registered:
-        known = ", ".join((AUTO, *names()))
+    if name not in _registered_methods:
+        known_names = ", ".join((AUTO, *names()))
         raise SceneError(
-            f'method "{name}" is not known; available are: {known}, and '
+            f'method "{name}" is not known; available are: {known_names}, and '
             "SciPy's as scipy-DOP853, -RK45, -RK23, -Radau, -BDF, -LSODA, SUNDIALS' as "
             "sundials-BDF, -Adams; and dttmm-classical, dttmm-classical-product"
         )
-    return _registered[name]
+    return _registered_methods[name]

@@ -7,7 +7,7 @@ those of the authors' program DOP853.
 
 from __future__ import annotations
 
-from .tableau import Tableau, frozen, hermite, sparse
+from .tableau import Tableau, hermite, parse_sparse_rows, to_read_only
 
 _STAGES, _EXTRA = 12, 3
 
@@ -120,22 +120,25 @@ _CORRECTIONS = """
 def tableau() -> Tableau:
     """The method `dop853`."""
     rows = _STAGES + 1 + _EXTRA
-    weights = sparse(_STEP, _STAGES)[0]
-    third, fifth = sparse(_THIRD, _STAGES + 1)[0], sparse(_FIFTH, _STAGES + 1)[0]
+    weights = parse_sparse_rows(_STEP, _STAGES)[0]
+    third, fifth = (
+        parse_sparse_rows(_THIRD, _STAGES + 1)[0],
+        parse_sparse_rows(_FIFTH, _STAGES + 1)[0],
+    )
     low = -third
     low[:_STAGES] += weights
     return Tableau(
         name="dop853",
         order=8,
-        A=frozen([[0.0] * _STAGES, *sparse(_MATRIX, _STAGES)]),
-        B=frozen(weights),
-        C=frozen([float(c) for c in _NODES.split()]),
-        dense=hermite(weights, n_extra=_EXTRA, D=sparse(_CORRECTIONS, rows)),
+        A=to_read_only([[0.0] * _STAGES, *parse_sparse_rows(_MATRIX, _STAGES)]),
+        B=to_read_only(weights),
+        C=to_read_only([float(c) for c in _NODES.split()]),
+        dense=hermite(weights, n_extra=_EXTRA, D=parse_sparse_rows(_CORRECTIONS, rows)),
         dense_order=7,
-        E=frozen(fifth),
+        E=to_read_only(fifth),
         error_order=7,
-        E_low=frozen(low),
-        A_extra=frozen(sparse(_EXTRA_MATRIX, rows)),
-        C_extra=frozen([float(c) for c in _EXTRA_NODES.split()]),
+        E_low=to_read_only(low),
+        A_extra=to_read_only(parse_sparse_rows(_EXTRA_MATRIX, rows)),
+        C_extra=to_read_only([float(c) for c in _EXTRA_NODES.split()]),
         source="Hairer, Norsett and Wanner (1993), section II.5",
     )

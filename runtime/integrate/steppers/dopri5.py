@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .tableau import Tableau, from_monomials, frozen
+from .tableau import Tableau, from_monomials, to_read_only
 
 _MATRIX = """
     0 0 0 0 0 0
@@ -48,12 +48,12 @@ def tableau() -> Tableau:
     return Tableau(
         name="dopri5",
         order=5,
-        A=frozen(_matrix(_MATRIX)),
-        B=frozen(_row(_STEP)),
-        C=frozen(_row(_NODES)),
+        A=to_read_only(_matrix(_MATRIX)),
+        B=to_read_only(_row(_STEP)),
+        C=to_read_only(_row(_NODES)),
         dense=from_monomials(_matrix(_DENSE)),
         dense_order=4,
-        E=frozen(_row(_ERROR)),
+        E=to_read_only(_row(_ERROR)),
         error_order=4,
         beta=0.02,  # measured: 12 to 14 % fewer evaluations where stability limits, else within 3 %
         source="Dormand and Prince (1980), dense output of Shampine (1986)",

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from .genalpha import RADIUS, constants
-from .implicit import Implicit, alpha
+from .genalpha import DEFAULT_RADIUS, constants
+from .implicit_methods import Implicit, make_newmark_family
 
 
-def tableau(radius: float = RADIUS) -> Implicit:
+def tableau(radius: float = DEFAULT_RADIUS) -> Implicit:
     """The method `dttmm`."""
-    of: dict[str, Any] = dict(constants(radius))
+    method_constants: dict[str, Any] = dict(constants(radius))
     source = "one linearisation per step of Chung and Hulbert (1993)"
-    return alpha("dttmm", source, one_iteration=True, **of)
+    return make_newmark_family("dttmm", source, one_iteration=True, **method_constants)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-from .implicit import Implicit, diagonal, numbers
+from .implicit_methods import Implicit, make_diagonal, parse_numbers
 
 _GAMMA = "31/125"
 _MATRIX = f"""
@@ -37,7 +37,12 @@ def tableau() -> Implicit:
     words = _MATRIX.split()
     rows = [words[i * (i + 1) // 2 : (i + 1) * (i + 2) // 2] for i in range(6)]
     matrix = [[float(Fraction(word)) for word in row] for row in rows]
-    return diagonal(
-        "esdirk436", 4, matrix, numbers(_NODES).tolist(), numbers(_ERROR), error_order=3,
+    return make_diagonal(
+        "esdirk436",
+        4,
+        matrix,
+        parse_numbers(_NODES).tolist(),
+        parse_numbers(_ERROR),
+        error_order=3,
         source="Kennedy and Carpenter (2019), ESDIRK4(3)6L[2]SA_2",
-    )  # fmt: skip
+    )

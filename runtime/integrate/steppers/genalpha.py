@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from .implicit import Implicit, alpha
+from .implicit_methods import Implicit, make_newmark_family
 
-RADIUS = 0.8  # default spectral radius at infinity
+DEFAULT_RADIUS = 0.8  # default spectral radius at infinity
 
 
 def constants(radius: float) -> dict[str, float]:
@@ -23,7 +23,7 @@ def constants(radius: float) -> dict[str, float]:
     }  # fmt: skip
 
 
-def tableau(radius: float = RADIUS) -> Implicit:
+def tableau(radius: float = DEFAULT_RADIUS) -> Implicit:
     """The method `genalpha`."""
-    of: dict[str, Any] = dict(constants(radius))
-    return alpha("genalpha", "Chung and Hulbert (1993)", **of)
+    method_constants: dict[str, Any] = dict(constants(radius))
+    return make_newmark_family("genalpha", "Chung and Hulbert (1993)", **method_constants)

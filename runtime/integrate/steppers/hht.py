@@ -6,14 +6,14 @@ algorithms in structural dynamics, Earthquake Engineering and Structural Dynamic
 
 from __future__ import annotations
 
-from .implicit import Implicit, alpha
+from .implicit_methods import Implicit, make_newmark_family
 
 _ALPHA = 0.05
 
 
 def tableau() -> Implicit:
     """The method `hht`."""
-    return alpha(
+    return make_newmark_family(
         "hht", "Hilber, Hughes and Taylor (1977)", alpha_f=_ALPHA,
         beta_n=0.25 * (1.0 + _ALPHA) ** 2, gamma_n=0.5 + _ALPHA,
     )  # fmt: skip

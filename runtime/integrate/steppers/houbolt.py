@@ -6,11 +6,11 @@ the Aeronautical Sciences 17 (1950) 540-550.  For comparison, with fixed steps.
 
 from __future__ import annotations
 
-from .implicit import Implicit, alpha
+from .implicit_methods import Implicit, make_newmark_family
 
 
 def tableau() -> Implicit:
     """The method `houbolt`."""
-    return alpha(
+    return make_newmark_family(
         "houbolt", "Houbolt (1950)", adaptive=False, beta_n=0.25, gamma_n=0.5, backward=True
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .implicit import Implicit, diagonal
+from .implicit_methods import Implicit, make_diagonal
 
 _GAMMA = 0.26
 _MATRIX = [
@@ -28,6 +28,6 @@ _NODES = [0.0, 0.52, 1.230333209967908, 0.895765984350076, 0.436393609858648, 1.
 def tableau() -> Implicit:
     """The method `kvaerno5`."""
     embedded, step = np.array([*_MATRIX[5], 0.0]), np.array(_MATRIX[6])
-    return diagonal(
+    return make_diagonal(
         "kvaerno5", 5, _MATRIX, _NODES, step - embedded, error_order=4, source="Kvaerno (2004)"
     )

@@ -6,9 +6,9 @@ Division 85 (1959) 67-94.
 
 from __future__ import annotations
 
-from .implicit import Implicit, alpha
+from .implicit_methods import Implicit, make_newmark_family
 
 
 def tableau() -> Implicit:
     """The method `newmark`."""
-    return alpha("newmark", "Newmark (1959)", beta_n=0.25, gamma_n=0.5)
+    return make_newmark_family("newmark", "Newmark (1959)", beta_n=0.25, gamma_n=0.5)

@@ -26,16 +26,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from .tableau import Tableau, divided_difference, from_monomials, frozen, integrals
+from .tableau import Tableau, divided_difference, from_monomials, integrals, to_read_only
 
 _ITERATIONS = 12
-_COMPARED = 9  # iterations of the result with which the error estimate compares
+_COMPARED_ITERATION = 9  # iterations of the result with which the error estimate compares
 
 #: Weight of the divided difference in the error estimate.  For oscillating forces it exceeds the
 #: error of Gauss's weights up to 20 rad per step; for smooth motion the iterates differ more.
-_ROUGHNESS = 1e-8
+_ROUGHNESS_WEIGHT = 1e-8
 
 #: Positive zeros of the Legendre polynomial of degree 8.
 _ZEROS = """
@@ -52,7 +52,9 @@ def _nodes() -> list[Fraction]:
 
 
 def _value(polynomial: Polynomial, at: Fraction) -> float:
-    return float(sum(x * at ** (power + 1) for power, x in enumerate(polynomial)))
+    return float(
+        sum(coefficient * at ** (exponent + 1) for exponent, coefficient in enumerate(polynomial))
+    )
 
 
 def tableau() -> Tableau:
@@ -62,28 +64,28 @@ def tableau() -> Tableau:
     slopes = integrals(nodes)
     weights = np.array([_value(p, Fraction(1)) for p in slopes])
     block = np.array([[_value(p, node) for p in slopes] for node in nodes])
-    places = [slice(1 + i * n, 1 + (i + 1) * n) for i in range(_ITERATIONS)]
+    block_slices = [slice(1 + i * n, 1 + (i + 1) * n) for i in range(_ITERATIONS)]
     stages = 1 + n * _ITERATIONS
     c = np.array([0.0, *[float(node) for node in nodes] * _ITERATIONS])
     a, b, error = np.zeros((stages, stages)), np.zeros(stages), np.zeros(stages + 1)
-    a[places[0], 0] = c[places[0]]
-    for before, after in pairwise(places):
-        a[after, before] = block
-    b[places[-1]] = error[places[-1]] = weights
-    error[places[_COMPARED - 1]] = -weights
-    error[[0, *range(stages - n, stages + 1)]] += _ROUGHNESS * np.array(
+    a[block_slices[0], 0] = c[block_slices[0]]
+    for previous, following in pairwise(block_slices):
+        a[following, previous] = block
+    b[block_slices[-1]] = error[block_slices[-1]] = weights
+    error[block_slices[_COMPARED_ITERATION - 1]] = -weights
+    error[[0, *range(stages - n, stages + 1)]] += _ROUGHNESS_WEIGHT * np.array(
         divided_difference([Fraction(0), *nodes, Fraction(1)])
     )
     return Tableau(
         name="pirk13",
         order=_ITERATIONS + 1,
-        A=frozen(a),
-        B=frozen(b),
-        C=frozen(c),
+        A=to_read_only(a),
+        B=to_read_only(b),
+        C=to_read_only(c),
         dense=_dense(nodes, weights, stages),
         dense_order=n + 1,
-        E=frozen(error),
-        error_order=_COMPARED,
+        E=to_read_only(error),
+        error_order=_COMPARED_ITERATION,
         iterated=(n, _ITERATIONS),
         source="van der Houwen and Sommeijer (1990), nodes of Gauss",
     )
@@ -92,8 +94,16 @@ def tableau() -> Tableau:
 def _dense(nodes: Sequence[Fraction], weights: Array, stages: int) -> Array:
     """Dense output whose slope interpolates k_0, the last eight stages and the next step's k_0."""
     points = [Fraction(0), *nodes, Fraction(1)]
-    narrow = np.array(from_monomials(integrals(points)))
-    narrow[:, 0] = [0.0, *weights, 0.0]  # exact values; rounding of the nodes would change them
-    wide = np.zeros((stages + 1, narrow.shape[1]))
-    wide[0], wide[stages - len(nodes) : stages], wide[stages] = narrow[0], narrow[1:-1], narrow[-1]
-    return frozen(wide)
+    compact_weights = np.array(from_monomials(integrals(points)))
+    compact_weights[:, 0] = [
+        0.0,
+        *weights,
+        0.0,
+    ]  # exact values; rounding of the nodes would change them
+    dense_weights = np.zeros((stages + 1, compact_weights.shape[1]))
+    dense_weights[0], dense_weights[stages - len(nodes) : stages], dense_weights[stages] = (
+        compact_weights[0],
+        compact_weights[1:-1],
+        compact_weights[-1],
+    )
+    return to_read_only(dense_weights)

@@ -7,7 +7,7 @@ slope at the end of a step is the first stage of the next step, so it adds no ev
 
 from __future__ import annotations
 
-from .tableau import Tableau, frozen, hermite
+from .tableau import Tableau, hermite, to_read_only
 
 
 def tableau() -> Tableau:
@@ -16,9 +16,9 @@ def tableau() -> Tableau:
     return Tableau(
         name="rk4",
         order=4,
-        A=frozen([[0.0, 0, 0, 0], [0.5, 0, 0, 0], [0.0, 0.5, 0, 0], [0.0, 0, 1, 0]]),
-        B=frozen(weights),
-        C=frozen([0.0, 0.5, 0.5, 1.0]),
+        A=to_read_only([[0.0, 0, 0, 0], [0.5, 0, 0, 0], [0.0, 0.5, 0, 0], [0.0, 0, 1, 0]]),
+        B=to_read_only(weights),
+        C=to_read_only([0.0, 0.5, 0.5, 1.0]),
         dense=hermite(weights),
         dense_order=3,
         source="Kutta (1901)",

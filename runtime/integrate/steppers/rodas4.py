@@ -8,7 +8,7 @@ Jacobian.
 
 from __future__ import annotations
 
-from .implicit import Implicit, lower, numbers, rosenbrock
+from .implicit_methods import Implicit, lower_triangle, make_rosenbrock, parse_numbers
 
 _MATRIX = """
     1.544
@@ -38,10 +38,19 @@ _DENSE = """
 
 def tableau() -> Implicit:
     """The method `rodas4`."""
-    matrix = lower(_MATRIX, 6)
-    return rosenbrock(
-        "rodas4", 4, 0.25, matrix, lower(_COUPLING, 6), numbers(_NODES), numbers(_TIME),
-        B=[*matrix[-1][:-1], 1.0], E=[0.0] * 5 + [1.0],
-        H=numbers(_DENSE).reshape(-1, 6), error_order=3, dense_order=3,
+    matrix = lower_triangle(_MATRIX, 6)
+    return make_rosenbrock(
+        "rodas4",
+        4,
+        0.25,
+        matrix,
+        lower_triangle(_COUPLING, 6),
+        parse_numbers(_NODES),
+        parse_numbers(_TIME),
+        B=[*matrix[-1][:-1], 1.0],
+        E=[0.0] * 5 + [1.0],
+        H=parse_numbers(_DENSE).reshape(-1, 6),
+        error_order=3,
+        dense_order=3,
         source="Hairer and Wanner (1996), RODAS",
-    )  # fmt: skip
+    )

@@ -8,7 +8,7 @@ Jacobian.
 
 from __future__ import annotations
 
-from .implicit import Implicit, lower, numbers, rosenbrock
+from .implicit_methods import Implicit, lower_triangle, make_rosenbrock, parse_numbers
 
 _MATRIX = """
     2
@@ -54,10 +54,19 @@ _DENSE = """
 
 def tableau() -> Implicit:
     """The method `rodas4pw`."""
-    matrix = lower(_MATRIX, 9)
-    return rosenbrock(
-        "rodas4pw", 4, 0.25, matrix, lower(_COUPLING, 9), numbers(_NODES), numbers(_TIME),
-        B=[*matrix[-1][:-1], 1.0], E=[0.0] * 8 + [1.0],
-        H=numbers(_DENSE).reshape(-1, 9), error_order=3, dense_order=3,
+    matrix = lower_triangle(_MATRIX, 9)
+    return make_rosenbrock(
+        "rodas4pw",
+        4,
+        0.25,
+        matrix,
+        lower_triangle(_COUPLING, 9),
+        parse_numbers(_NODES),
+        parse_numbers(_TIME),
+        B=[*matrix[-1][:-1], 1.0],
+        E=[0.0] * 8 + [1.0],
+        H=parse_numbers(_DENSE).reshape(-1, 9),
+        error_order=3,
+        dense_order=3,
         source="Steinebach (2026), Rodas4PW",
-    )  # fmt: skip
+    )

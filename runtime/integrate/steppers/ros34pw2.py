@@ -9,7 +9,7 @@ Jacobian.  Dense output is the cubic through both ends and their slopes.
 
 from __future__ import annotations
 
-from .implicit import Implicit, lower, numbers, rosenbrock
+from .implicit_methods import Implicit, lower_triangle, make_rosenbrock, parse_numbers
 
 _MATRIX = """
     2
@@ -29,8 +29,17 @@ _ERROR = "0.2777499476479681 -1.4032398951759992 1.7726301276675507 0.5"
 
 def tableau() -> Implicit:
     """The method `ros34pw2`."""
-    return rosenbrock(
-        "ros34pw2", 3, 0.435866521508459, lower(_MATRIX, 4), lower(_COUPLING, 4),
-        numbers(_NODES), numbers(_TIME), B=numbers(_STEP), E=numbers(_ERROR), error_order=2,
-        dense_order=3, source="Rang and Angermann (2005), ROS34PW2",
-    )  # fmt: skip
+    return make_rosenbrock(
+        "ros34pw2",
+        3,
+        0.435866521508459,
+        lower_triangle(_MATRIX, 4),
+        lower_triangle(_COUPLING, 4),
+        parse_numbers(_NODES),
+        parse_numbers(_TIME),
+        B=parse_numbers(_STEP),
+        E=parse_numbers(_ERROR),
+        error_order=2,
+        dense_order=3,
+        source="Rang and Angermann (2005), ROS34PW2",
+    )

@@ -22,20 +22,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 #: Maximum number of stages of a block that C evaluates together.
-LANES = 8
+MAX_LANES = 8
 
 
-def frozen(values: ArrayLike | Sequence[Any]) -> Array:
+def to_read_only(values: ArrayLike | Sequence[Any]) -> Array:
     """Contiguous, read-only copy in double precision."""
     array = np.array(values, dtype=np.float64, order="C")
     array.flags.writeable = False
     return array
 
 
-def sparse(text: str, columns: int) -> list[Array]:
+def parse_sparse_rows(text: str, columns: int) -> list[Array]:
     """Read rows of published decimals, `column:value`; every row starts with column 0."""
     rows: list[Array] = []
     for word in text.split():
@@ -85,8 +85,8 @@ class Tableau:
     E: Array | None = None
     error_order: int = 0
     E_low: Array | None = None
-    A_extra: Array = field(default_factory=lambda: frozen(np.zeros((0, 0))))
-    C_extra: Array = field(default_factory=lambda: frozen(np.zeros(0)))
+    A_extra: Array = field(default_factory=lambda: to_read_only(np.zeros((0, 0))))
+    C_extra: Array = field(default_factory=lambda: to_read_only(np.zeros(0)))
     beta: float = 0.0
     iterated: tuple[int, int] | None = None
     most_unknowns: int = 0
@@ -122,13 +122,15 @@ class Tableau:
             raise ValueError(f"tableau {self.name}: its stages are not {self.iterated} blocks")
 
     def _is_iterated(self, nodes: int, iterations: int) -> bool:
-        if not 1 <= nodes <= LANES or iterations < 2 or self.n_stages != 1 + nodes * iterations:
+        if not 1 <= nodes <= MAX_LANES or iterations < 2 or self.n_stages != 1 + nodes * iterations:
             return False
         expected = np.zeros_like(self.A)
         expected[1 : 1 + nodes, 0] = self.C[1 : 1 + nodes]
         for block in range(1, iterations):
-            at, before = 1 + block * nodes, 1 + (block - 1) * nodes
-            expected[at : at + nodes, before:at] = self._block(nodes)
+            block_start, previous_start = 1 + block * nodes, 1 + (block - 1) * nodes
+            expected[block_start : block_start + nodes, previous_start:block_start] = self._block(
+                nodes
+            )
         nodes_repeat = np.array_equal(self.C[1:], np.tile(self.C[1 : 1 + nodes], iterations))
         return nodes_repeat and np.array_equal(self.A, expected)
 
@@ -139,7 +141,7 @@ class Tableau:
     def mix(self) -> Array:
         """Weights (nodes, 8) of an iterated method's blocks, transposed for eight lanes."""
         nodes = self.iterated[0] if self.iterated else 0
-        mix = np.zeros((nodes, LANES))
+        mix = np.zeros((nodes, MAX_LANES))
         mix[:, :nodes] = self._block(nodes).T
         return mix
 
@@ -147,15 +149,15 @@ class Tableau:
     def read_blocks(self) -> list[int]:
         """1 for every block of an iterated method that more than the next block reads, else 0."""
         nodes, iterations = self.iterated or (1, 0)
-        reading = [self.B, np.abs(self.dense).sum(axis=1), np.abs(self.A_extra).sum(axis=0)]
-        reading += [row for row in (self.E, self.E_low) if row is not None]
+        reading_rows = [self.B, np.abs(self.dense).sum(axis=1), np.abs(self.A_extra).sum(axis=0)]
+        reading_rows += [row for row in (self.E, self.E_low) if row is not None]
         blocks = [slice(1 + i * nodes, 1 + (i + 1) * nodes) for i in range(iterations)]
-        return [int(any(np.any(row[block]) for row in reading)) for block in blocks]
+        return [int(any(np.any(row[block]) for row in reading_rows)) for block in blocks]
 
     def _rows(self) -> list[Array]:
-        none = np.zeros(0)
+        empty = np.zeros(0)
         rows = [*self.A[1:], self.B]
-        rows += [none if row is None else row for row in (self.E, self.E_low)]
+        rows += [empty if row is None else row for row in (self.E, self.E_low)]
         return [*rows, *self.A_extra, *self.dense.T]
 
     @cached_property
@@ -164,11 +166,11 @@ class Tableau:
         rows = self._rows()
         starts, columns, weights = [0], list[int](), list[float]()
         for row in rows:
-            places = np.flatnonzero(row)
-            columns += places.tolist()
-            weights += row[places].tolist()
+            nonzero_columns = np.flatnonzero(row)
+            columns += nonzero_columns.tolist()
+            weights += row[nonzero_columns].tolist()
             starts.append(len(columns))
-        return starts, columns, frozen(weights)
+        return starts, columns, to_read_only(weights)
 
     @property
     def implicit(self) -> bool:
@@ -197,10 +199,10 @@ class Tableau:
 
     def weights(self, theta: float) -> Array:
         """Weights p(theta) (s + 1 + e,): y(t + theta h) = y(t) + h p(theta) @ k."""
-        sum_ = np.zeros(self.dense.shape[0])
+        total = np.zeros(self.dense.shape[0])
         for j in reversed(range(self.n_dense)):
-            sum_ = (sum_ + self.dense[:, j]) * (1.0 - theta if j % 2 else theta)
-        return sum_
+            total = (total + self.dense[:, j]) * (1.0 - theta if j % 2 else theta)
+        return total
 
     @cached_property
     def stability_polynomial(self) -> Array:
@@ -209,14 +211,14 @@ class Tableau:
         for _ in range(self.n_stages):
             coefficients.append(float(row.sum()))
             row = row @ self.A
-        return frozen(np.trim_zeros(coefficients, "b"))
+        return to_read_only(np.trim_zeros(coefficients, "b"))
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
         """R(z) of one step on y' = lambda y with z = h lambda: y(t + h) = R(z) y(t)."""
-        at = np.asarray(z, dtype=np.complex128)
-        value = np.zeros_like(at)
+        points = np.asarray(z, dtype=np.complex128)
+        value = np.zeros_like(points)
         for coefficient in self.stability_polynomial[::-1]:
-            value = value * at + coefficient
+            value = value * points + coefficient
         return value
 
     @cached_property
@@ -260,7 +262,7 @@ def hermite(B: Sequence[float] | Array, n_extra: int = 0, D: ArrayLike | None = 
     columns = [step, first - step, 2.0 * step - first - last]
     if D is not None:
         columns += list(np.asarray(D, dtype=np.float64))
-    return frozen(np.stack(columns, axis=1))
+    return to_read_only(np.stack(columns, axis=1))
 
 
 def from_monomials(P: Iterable[Iterable[Any]]) -> Array:
@@ -274,25 +276,27 @@ def from_monomials(P: Iterable[Iterable[Any]]) -> Array:
     basis = _basis_in_monomials(degree)
     dense = []
     for row in rows:
-        rest, weights = list(row), [Fraction(0)] * degree
+        remainder, weights = list(row), [Fraction(0)] * degree
         for j in reversed(range(degree)):  # phi_j has degree j + 1: strip the highest power first
-            weights[j] = rest[j] / basis[j][j]
-            rest = [r - weights[j] * b for r, b in zip(rest, basis[j], strict=True)]
+            weights[j] = remainder[j] / basis[j][j]
+            remainder = [r - weights[j] * b for r, b in zip(remainder, basis[j], strict=True)]
         dense.append([float(w) for w in weights])
-    return frozen(dense)
+    return to_read_only(dense)
 
 
 def integrals(nodes: Sequence[Fraction]) -> list[list[Fraction]]:
     """Coefficients of theta, theta^2, ... of the integral from 0 of each Lagrange polynomial."""
-    found = []
+    integrals_found = []
     for i, node in enumerate(nodes):
         product = [Fraction(1)]
-        for j, other in enumerate(nodes):
+        for j, other_node in enumerate(nodes):
             if j != i:
-                shifted, scaled = [Fraction(0), *product], [other * x for x in product] + [0]
-                product = [(a - b) / (node - other) for a, b in zip(shifted, scaled, strict=True)]
-        found.append([x / (power + 1) for power, x in enumerate(product)])
-    return found
+                shifted, scaled = [Fraction(0), *product], [other_node * x for x in product] + [0]
+                product = [
+                    (a - b) / (node - other_node) for a, b in zip(shifted, scaled, strict=True)
+                ]
+        integrals_found.append([x / (power + 1) for power, x in enumerate(product)])
+    return integrals_found
 
 
 def divided_difference(points: Sequence[Any]) -> list[float]:

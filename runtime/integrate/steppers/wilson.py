@@ -6,12 +6,12 @@ Earthquake Engineering and Structural Dynamics 1 (1973) 241-252.  For comparison
 
 from __future__ import annotations
 
-from .implicit import Implicit, alpha
+from .implicit_methods import Implicit, make_newmark_family
 
 
 def tableau() -> Implicit:
     """The method `wilson`."""
-    return alpha(
+    return make_newmark_family(
         "wilson", "Wilson, Farhoomand and Bathe (1973)", adaptive=False, beta_n=1.0 / 6.0,
         gamma_n=0.5, collocation=1.4,
     )  # fmt: skip

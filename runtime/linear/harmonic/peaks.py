@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ..motions import Complex
-from ..response import FrequencyResponse
+from ..frequency_response import FrequencyResponse
+from ..modes import Complex
 
 #: Frequencies about each motion, in parts of it; and in parts of its damping ratio.
 _BESIDE, _WITHIN = (0.0, 1e-4, 1e-3, 1e-2), (0.5, 1.0, 2.0)

@@ -18,16 +18,16 @@ from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.scene.tables.closures import ROLLING
 
-from ...engine.loops.freedom import Freedom, read_off
-from ..loops.mechanism import Mechanism, torn_trees
+from ...engine.loops.independent_speeds import IndependentSpeeds, select_rows
+from ..loops.constrained_linearisation import ConstrainedLinearisation, torn_trees
 
 if TYPE_CHECKING:
-    from ...engine.compiled import Compiled
-    from ..matrices import State
+    from ...engine.compiled_scene import CompiledScene
+    from ..mck_matrices import State
     from ..operating_point.friction import DryFriction
 
 #: Weights of a central difference by the number of steps, and its steps in sizes of coordinates.
@@ -37,7 +37,7 @@ _STEPS = (1e-2, 1e-3, 1e-4)
 _ROUNDING = 1e-9
 
 
-def has_speed_rows(model: Compiled) -> bool:
+def has_speed_rows(model: CompiledScene) -> bool:
     """Whether rows restrict speeds alone: discs that roll, couplings of speeds."""
     scene = model.packed.described
     return any(one.type == ROLLING for one in scene.constraint) or any(
@@ -46,7 +46,7 @@ def has_speed_rows(model: Compiled) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class RollingMechanism(Mechanism):
+class RollingMechanism(ConstrainedLinearisation):
     """Independent positions and speeds; `places` and `ways` are those of the positions, P (nu, n).
 
     Attributes:
@@ -108,7 +108,7 @@ def refuse_second_order(found: RollingMechanism) -> NoReturn:
 
 
 def rolling_at(
-    model: Compiled,
+    model: CompiledScene,
     state: State,
     changing: Array | None = None,
     dry: DryFriction | None = None,
@@ -132,8 +132,8 @@ def rolling_at(
         motions = np.linalg.qr(freedom.following(state.q, freedom.chosen(state.q))
                                / freedom.sizes[:, None])[0]  # fmt: skip
         own = (
-            tuple(sorted(read_off(basis, free)[0])),
-            tuple(sorted(read_off(motions, lasting)[0])),
+            tuple(sorted(select_rows(basis, free)[0])),
+            tuple(sorted(select_rows(motions, lasting)[0])),
         )
     positions, speeds = own
     ways = basis * freedom.sizes[:, None]
@@ -152,7 +152,7 @@ def rolling_at(
 class _Rows:
     """J of the rows of one scene at q (nq,), and how J u changes with q."""
 
-    def __init__(self, freedom: Freedom, q: Array) -> None:
+    def __init__(self, freedom: IndependentSpeeds, q: Array) -> None:
         self._freedom, self._q, self._sizes = freedom, q, freedom.sizes
         self._J = np.array([freedom.slip(q, one) for one in np.eye(len(self._sizes))]).T
         of_speeds = freedom.rows_of_speeds

@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import block_diag, expm
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 if TYPE_CHECKING:
-    from ...engine.compiled import Compiled
-    from ...pack.layout import HingeSlots
-    from ..matrices import State
+    from ...engine.compiled_scene import CompiledScene
+    from ...packing.coordinate_layout import HingeSlots
+    from ..mck_matrices import State
 
 #: Directions in which speeds say less than this part of their size about w.
 _ROUNDING = 1e-9
@@ -44,7 +44,7 @@ class Frames:
         return np.asarray(expm(dt * self.generator))
 
 
-def frames_at(model: Compiled, state: State) -> Frames:
+def frames_at(model: CompiledScene, state: State) -> Frames:
     """The frames in which the speeds of a state change least."""
     rates, generator = dict[str, Array](), np.zeros((model.nu, model.nu))
     for slots in _turning(model):
@@ -59,7 +59,7 @@ def frames_at(model: Compiled, state: State) -> Frames:
     return Frames(rates, generator)
 
 
-def turns_in_space(model: Compiled, state: State, frames: Frames) -> bool:
+def turns_in_space(model: CompiledScene, state: State, frames: Frames) -> bool:
     """Whether a frame of a ball or free hinge turns beside the inboard body."""
     for slots in _turning(model):
         speeds = state.u[slots.u + slots.nu - 3 : slots.u + slots.nu]
@@ -69,7 +69,7 @@ def turns_in_space(model: Compiled, state: State, frames: Frames) -> bool:
     return False
 
 
-def _turning(model: Compiled) -> Iterator[HingeSlots]:
+def _turning(model: CompiledScene) -> Iterator[HingeSlots]:
     """Hinges with quaternions whose speeds are in the axes of their outboard bodies, turns last."""
     for slots in model.layout.hinges.values():
         if slots.quaternion is not None and slots.steady and slots.nu in (3, 6):

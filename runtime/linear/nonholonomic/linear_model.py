@@ -21,31 +21,31 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.printable import abbreviate
 from mstmm.risk import RUN, DeferredRisks, Risk
+from mstmm.safe_text import abbreviate_names
 
-from ...engine.sizes import speed_sizes
-from ...guard.answers import find_state_risks
-from ...run.system import SceneSystem
-from .. import shares
-from ..channels import Channel, columns, some_names
-from ..harmonic.refused import refuse_in_motion
-from ..judged import find_omissions, find_response_risks, without_effect
-from ..linear import Linear
-from ..matrices import State, matrices
-from ..motions import Modes
+from ...engine.characteristic_scales import speed_scales
+from ...risk_checks.answers import find_state_risks
+from ...run.scene_system import SceneSystem
+from .. import energy_shares
+from ..frequency_response import FrequencyResponse, angular_frequencies, chosen_pushes
+from ..harmonic.damping_checks import refuse_in_motion
+from ..input_channels import Channel, columns, some_names
+from ..linear_model import Linear
+from ..mck_matrices import State, matrices
+from ..modes import Modes
 from ..operating_point.sticking import Ways, friction_risks, saturation_risks
-from ..output.outputs import Rows, outputs_of, rows_of
-from ..response import FrequencyResponse, angular_frequencies, chosen_pushes
+from ..outputs.linear_outputs import Rows, outputs_of, rows_of
 from ..rotors.later import SAME, apart
+from ..validity import find_omissions, find_response_risks, without_effect
 from .admissible import RollingMechanism, refuse_second_order, rolling_at
 from .eigenvalues import core_of, eigenpairs
 from .frames import Frames, frames_at, turns_in_space
 
 if TYPE_CHECKING:
-    from ..output.seen import Seen
+    from ..outputs.output_rows import LinearQuantity
 
 Complex = NDArray[np.complex128]
 #: Exact slopes (nu, nu) at a state, by the names of `Derivatives`.
@@ -277,11 +277,13 @@ class NonholonomicLinear(Linear):
         leaving = self._accelerating()
         if leaving:
             yield Risk(
-                "unsteady-state", abbreviate(leaving),
-                f"the state does not last: {abbreviate(leaving)} accelerate there, so that the "
+                "unsteady-state",
+                abbreviate_names(leaving),
+                f"the state does not last: {abbreviate_names(leaving)} accelerate there, so that "
+                f"the "
                 "model holds beside the motion through it, and only for a moment",
                 "linearise at an equilibrium or a steady motion",
-            )  # fmt: skip
+            )
         elif self._changes():
             yield Risk(
                 "changing-coefficients", RUN,
@@ -303,13 +305,13 @@ class NonholonomicLinear(Linear):
         units = [h.u_units[k - h.u].removesuffix("/s") for h, k in zip(hinges, places, strict=True)]
         along = rolling.speed_ways
         return Ways(
-            self.speeds, units, speed_sizes(self.model)[places], lambda x: along @ x,
+            self.speeds, units, speed_scales(self.model)[places], lambda x: along @ x,
             lambda efforts: along.T @ efforts,
         )  # fmt: skip
 
     def _accelerating(self) -> list[str]:
         """Independent speeds that change in the frames, here or a little further along."""
-        found, sizes = list[str](), speed_sizes(self.model)
+        found, sizes = list[str](), speed_scales(self.model)
         for one in (self, self._later):
             state, places = one.state, [*self._rolling.speed_places]
             left = (one.turned @ (state.a + self.frames.generator @ state.u))[places]
@@ -333,7 +335,7 @@ class NonholonomicLinear(Linear):
         rolling = rolling_at(model, state, None, self.dry, (own.places, own.speed_places))
         return replace(self, state=state, mechanism=rolling, rotation=rotation)
 
-    def _refuse_unsteady(self, pushes: Sequence[Channel], shown: Sequence[Seen]) -> None:
+    def _refuse_unsteady(self, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]) -> None:
         """SceneError where what is asked changes along the motion."""
         changing, there = [*self._accelerating()], self._later
         changing += ["the matrices"] if self._changes() else []
@@ -347,7 +349,8 @@ class NonholonomicLinear(Linear):
         changing += [x.name for k, x in enumerate(shown) if apart(read[k], later[k]) > SAME]
         if changing:
             raise SceneError(
-                f"frequency response: along the motion changes {abbreviate(changing)}, so that "
+                f"frequency response: along the motion changes {abbreviate_names(changing)}, so "
+                f"that "
                 "other frequencies answer too; push and read what keeps its axes, or simulate"
             )
 
@@ -374,7 +377,7 @@ class NonholonomicModes(Modes):
 
     def kinetic(self) -> dict[str, Array]:
         """Body -> (k,): its part of the kinetic energy of the speeds of each motion."""
-        return shares.kinetic_of_speeds(self.linear.model, self.linear.state.q, self.moved)
+        return energy_shares.kinetic_of_speeds(self.linear.model, self.linear.state.q, self.moved)
 
 
 def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
@@ -396,7 +399,7 @@ def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
     and the rotation (nu, nu) of the axes of bodies there into these."""
     model, state, frames = linear.model, linear.state, linear.frames
     engine, memory, rolling = model.looped, model.looped.start_memory(), linear._rolling
-    dt = _AHEAD / float(np.abs(state.u / speed_sizes(model)).max())
+    dt = _AHEAD / float(np.abs(state.u / speed_scales(model)).max())
     h, q = dt / _STEPS, state.q
 
     def speeds(time: float, at: Array) -> Array:

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ..channels import Channel
-from ..output.outputs import outputs_of, rows_of
-from ..output.seen import Seen
-from ..pushed import Pushed
+from ..harmonic_loads import HarmonicLoads
+from ..input_channels import Channel
+from ..outputs.linear_outputs import outputs_of, rows_of
+from ..outputs.output_rows import LinearQuantity
 from .departure import LARGEST
 from .later import LaterStates
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: The name of M, C and K among what changes.
 MATRICES = "the matrices"
@@ -26,7 +26,10 @@ _SAME, _FAINT, _ROUNDING = 1e-6, 1e-9, 1e-12
 
 
 def find_changes(
-    linear: Equations, later: LaterStates, pushes: Sequence[Channel], shown: Sequence[Seen] = ()
+    linear: LinearEquations,
+    later: LaterStates,
+    pushes: Sequence[Channel],
+    shown: Sequence[LinearQuantity] = (),
 ) -> list[str]:
     """What changes along the motion: `MATRICES`, and names of pushes and outputs."""
     names, changing = [one.name for one in shown], dict[str, None]()
@@ -44,17 +47,19 @@ def find_changes(
     return list(changing)
 
 
-def _effects(linear: Equations, pushes: Sequence[Channel]) -> list[Array]:
+def _effects(linear: LinearEquations, pushes: Sequence[Channel]) -> list[Array]:
     """Of each push what a unit of it, and of the motion of its drive, does."""
     if not pushes:
         return []
     efforts = np.zeros((len(pushes), linear.model.nu))
     efforts[:, list(linear.free)] = linear.pushed(pushes).T
-    found = Pushed.of(linear, pushes, efforts)
+    found = HarmonicLoads.of(linear, pushes, efforts)
     return [found.columns[found.parts[:, k] != 0] for k in range(len(pushes))]
 
 
-def _rows(linear: Equations, shown: Sequence[Seen], pushes: Sequence[Channel]) -> list[Array]:
+def _rows(
+    linear: LinearEquations, shown: Sequence[LinearQuantity], pushes: Sequence[Channel]
+) -> list[Array]:
     """Of each output what it is of increments, their rates and accelerations, of the drives that
     are pushes and of these at once."""
     places = [*linear.free, *(speed for one in pushes for speed, _ in one.moves)]
@@ -71,7 +76,7 @@ def _differ(one: Array, other: Array) -> bool:
     return float(np.abs(one - other).max(initial=0)) > _SAME * scale + _ROUNDING
 
 
-def _matrices_differ(one: Equations, other: Equations) -> bool:
+def _matrices_differ(one: LinearEquations, other: LinearEquations) -> bool:
     """Whether M, C or K differ, each entry seen beside its row and its column in a scene of unit
     masses."""
     scale = np.sqrt(np.maximum(one.M.diagonal(), np.finfo(float).tiny))

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...engine.sizes import speed_sizes
+from ...engine.characteristic_scales import speed_scales
 from .later import LaterStates
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
 #: stiffness that counts as none, in parts.
@@ -39,7 +39,7 @@ class Departure:
         return f"{abs(self.effort):.4g} {self.unit} along {self.worst} at t = {self.t:.6g} s"
 
 
-def find_departure(linear: Equations, later: LaterStates | None = None) -> Departure | None:
+def find_departure(linear: LinearEquations, later: LaterStates | None = None) -> Departure | None:
     """What leaves the operating point there or, with `later`, further along its motion; None where
     it lasts."""
     states = [linear.state, *(() if later is None else later.every)]
@@ -47,7 +47,7 @@ def find_departure(linear: Equations, later: LaterStates | None = None) -> Depar
     a = np.array([one.a[free] for one in states]).T
     if not a.any():
         return None
-    sizes = speed_sizes(linear.model)[free]
+    sizes = speed_scales(linear.model)[free]
     leaves, efforts = _leaving(linear, a, sizes)
     if not leaves.any():
         return None
@@ -61,7 +61,7 @@ def find_departure(linear: Equations, later: LaterStates | None = None) -> Depar
     return Departure(names, linear.coordinates[worst], effort, unit, states[at].t)
 
 
-def _leaving(linear: Equations, a: Array, sizes: Array) -> tuple[NDArray[np.bool_], Array]:
+def _leaving(linear: LinearEquations, a: Array, sizes: Array) -> tuple[NDArray[np.bool_], Array]:
     """(n, k) which coordinates leave under accelerations a (n, k): those further from rest than a
     small part of their sizes, and those that accelerate though nothing holds them; and the efforts
     that are missing."""
@@ -76,14 +76,14 @@ def _leaving(linear: Equations, a: Array, sizes: Array) -> tuple[NDArray[np.bool
     return (np.abs(away) > _STILL) | (np.abs(left) > _STILL), efforts
 
 
-def _efforts(linear: Equations, a: Array) -> Array:
+def _efforts(linear: LinearEquations, a: Array) -> Array:
     """(n, k) M a, without matrices where there are none."""
     if linear.mechanism is not None:
         return linear.M @ a
     return np.array([linear.pencil.mass(column) for column in a.T]).T
 
 
-def _displacement_by_sweep(linear: Equations, a: Array) -> Array:
+def _displacement_by_sweep(linear: LinearEquations, a: Array) -> Array:
     """(n,) distance from rest, K^-1 M a, without matrices; infinite where K is singular."""
     if linear.mechanism is not None or linear.turning is not None:
         return np.where(a == 0, 0.0, np.inf)

@@ -21,16 +21,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from scipy.special import dawsn
 
-from mstmm.arrays import Array, real
+from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
-from mstmm.scene.rules.messages import near
+from mstmm.scene.validators.validation_messages import did_you_mean
 
-from ...engine.engine import Engine
-from ...pack.pack import packed_system
-from ...pack.system import LawNumbers, LawRun
+from ...engine.looped_engine import LoopedEngine
+from ...packing.scene_packing import packed_system
+from ...packing.system import LawNumbers, LawRun
 
 if TYPE_CHECKING:
-    from ...engine.compiled import Compiled
+    from ...engine.compiled_scene import CompiledScene
 
 #: Amplitudes of speed (rad/s or m/s): one, or by the names of hinges, chains and speeds.
 Amplitudes = float | Mapping[str, float] | None
@@ -57,7 +57,7 @@ class DryFriction:
     """Friction of the hinges of a model that do not slide at speeds u (nu,), and what takes its
     place."""
 
-    model: Compiled
+    model: CompiledScene
     rubbing: Mapping[int, Rubbing]
     amplitudes: Amplitudes
 
@@ -79,11 +79,11 @@ class DryFriction:
 
         return tuple(law for run in laws for law in changed_laws(run, change))
 
-    def engine(self, model: Compiled) -> Engine:
+    def engine(self, model: CompiledScene) -> LoopedEngine:
         """The looped engine of this model, or of it with other numbers, with these laws."""
         packed = model.packed
         made = replace(packed.system, laws=self.replaced(packed.system.laws))
-        return Engine(packed_system(made, packed))
+        return LoopedEngine(packed_system(made, packed))
 
 
 def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
@@ -101,7 +101,7 @@ def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -
         yield LawRun(body, 1, 1, (alone,), max(twist, 0))
 
 
-def dry_friction(model: Compiled, u: Array, amplitudes: Amplitudes) -> DryFriction:
+def dry_friction(model: CompiledScene, u: Array, amplitudes: Amplitudes) -> DryFriction:
     """The friction that a linear model about a state with speeds u (nu,) replaces.
 
     Raises SceneError for names without friction and amplitudes that are not positive.
@@ -134,7 +134,7 @@ def _rubbing(speed: int, p: tuple[float, ...], amplitude: float | None) -> Rubbi
 
 
 def _amplitudes(
-    model: Compiled, given: Amplitudes, speeds: list[int]
+    model: CompiledScene, given: Amplitudes, speeds: list[int]
 ) -> Callable[[int], float | None]:
     """The amplitude of a speed; None where none is given for it."""
     if given is None:
@@ -148,7 +148,7 @@ def _amplitudes(
         if name not in every:
             raise SceneError(
                 f'friction: "{name}": expected a hinge with dry friction, its chain or one of its '
-                f"speeds{near(str(name), every)}"
+                f"speeds{did_you_mean(str(name), every)}"
             )
     amplitudes = {x: _amplitude(f'friction["{x}"]', value) for x, value in given.items()}
     return lambda speed: next(
@@ -163,7 +163,7 @@ def _names(speed: str) -> tuple[str, str, str]:
 
 
 def _amplitude(what: str, value: float) -> float:
-    found = real(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
+    found = finite_float(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
     if found <= 0:
         raise SceneError(
             f"{what} = {found:g}: expected an amplitude of speed above 0 in rad/s or m/s; leave it "

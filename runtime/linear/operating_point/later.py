@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.printable import abbreviate
+from mstmm.safe_text import abbreviate_names
 
-from ...breaks.acting import acting
-from ...engine.sizes import speed_sizes
-from ...engine.states.steady_motion import move_steadily
-from ...run.system import SceneSystem
-from ..matrices import State
+from ...discontinuities.active_expressions import active_expressions
+from ...engine.characteristic_scales import speed_scales
+from ...engine.state_evaluation.steady_motion import move_steadily
+from ...run.scene_system import SceneSystem
+from ..mck_matrices import State
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: How far the fastest and the slowest motion go on, rad or lengths of the scene: no two differ by
 #: a part of a turn with a small whole number.
@@ -47,7 +47,7 @@ class LaterStates:
         driven: places of the speeds of drives that move at the operating point.
     """
 
-    def __init__(self, linear: Equations) -> None:
+    def __init__(self, linear: LinearEquations) -> None:
         self._linear, system = linear, linear.model.packed.system
         state, first = linear.state, system.places["u"]
         drives = [int(first[place]) + k for place, k in system.driven]
@@ -63,7 +63,7 @@ class LaterStates:
         self.every = [*turning, *timed]
         self.sparse = [*turning, *(timed[::_SPARSE] if depends else ())]
 
-    def equations(self) -> Iterator[Equations]:
+    def equations(self) -> Iterator[LinearEquations]:
         """The linear equations at those states at which they are compared."""
         for state in self.sparse:
             yield equations_at(self._linear, state)
@@ -74,7 +74,7 @@ class LaterStates:
         model = self._linear.model
         hinges = dict.fromkeys(model.layout.hinge_of_speed(k).name for k in self.driven)
         if hinges:
-            return f"while drives move on (of {abbreviate(list(hinges))})"
+            return f"while drives move on (of {abbreviate_names(list(hinges))})"
         if self._linear.state.u.any():
             return "while the motion goes on"
         return "as loads or drives change with time"
@@ -82,7 +82,7 @@ class LaterStates:
     def _phases(self) -> list[float]:
         """Times (s) after which what moves has gone on by `_PHASES`, or as far as it comes."""
         linear = self._linear
-        rates = np.abs(linear.state.u) / speed_sizes(linear.model)
+        rates = np.abs(linear.state.u) / speed_scales(linear.model)
         rates = rates[rates > _STILL * rates.max(initial=0)]
         ends = {float(rates.max()), float(rates.min())} if len(rates) else set()
         times = [phase / rate for rate in sorted(ends, reverse=True) for phase in _PHASES]
@@ -92,7 +92,7 @@ class LaterStates:
         """Times (s) from the state on, between those at which expressions and inputs switch."""
         scene, t = self._linear.model.scene, self._linear.state.t
         inputs, found = scene.channels, set[float]()
-        for one in acting(scene):
+        for one in active_expressions(scene):
             found.update(one.expression.time_breaks())
             found.update(knot for name in one.inputs for knot in inputs[name].knots)
         ahead = sorted(x - t for x in found if x > t)
@@ -111,7 +111,7 @@ class LaterStates:
                 yield state
 
 
-def equations_at(linear: Equations, state: State) -> Equations:
+def equations_at(linear: LinearEquations, state: State) -> LinearEquations:
     """The same equations at another state of the same motion."""
     loops = linear.mechanism
     loops = None if loops is None else loops.at(state)
@@ -123,11 +123,11 @@ def equations_at(linear: Equations, state: State) -> Equations:
     )
 
 
-def _state_after(linear: Equations, dt: float) -> State | None:
+def _state_after(linear: LinearEquations, dt: float) -> State | None:
     """The state after dt (s); None where closed loops would have to be followed too far."""
     state, count = linear.state, 1
     if linear.mechanism is not None:
-        rate = float((np.abs(state.u) / speed_sizes(linear.model)).max(initial=0))
+        rate = float((np.abs(state.u) / speed_scales(linear.model)).max(initial=0))
         count = max(1, int(np.ceil(dt * rate / _STRIDE)))
         if count > _MOST_STRIDES:
             return None
@@ -140,7 +140,7 @@ def _state_after(linear: Equations, dt: float) -> State | None:
     return State(state.t + dt, q, u, a[0])
 
 
-def _moved(linear: Equations, t: float, q: Array, u: Array, dt: float) -> tuple[Array, Array]:
+def _moved(linear: LinearEquations, t: float, q: Array, u: Array, dt: float) -> tuple[Array, Array]:
     """State at t after a step of dt with drives and loops in order, the speeds of x as they are."""
     model, loops = linear.model, linear.mechanism
     engine = model.looped

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
-from mstmm.printable import abbreviate
-from mstmm.risk import Risk, advice
+from mstmm.risk import Risk, information
+from mstmm.safe_text import abbreviate_names
 
-from ...engine.sizes import speed_sizes
-from ...run.start import initial_state
+from ...engine.characteristic_scales import speed_scales
+from ...run.start_state import initial_state
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: What pushes a motion back or slows it down is weak below these parts of (its speed)^2 and of its
 #: speed, in sizes a second.
@@ -26,7 +26,7 @@ _WEAK, _SLOW = 0.01, 0.1
 _CHANGED, _ROUNDING = 1e-3, 1e-9
 
 
-def find_start_risks(linear: Equations, most: int) -> Iterator[Risk]:
+def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
     """One risk where the scene starts with speeds that last and change the model, which is at rest
     because no state was given; of more than `most` coordinates any speed counts."""
     if linear.at_speeds is None or not len(linear):
@@ -40,8 +40,8 @@ def find_start_risks(linear: Equations, most: int) -> Iterator[Risk]:
         if not speeds.any() or not _matter(plain, speeds):
             return
     moving = np.flatnonzero(np.abs(speeds) > _ROUNDING * np.abs(speeds).max())
-    names = abbreviate([linear.model.layout.u_name(linear.free[k]) for k in moving])
-    yield advice(
+    names = abbreviate_names([linear.model.layout.u_name(linear.free[k]) for k in moving])
+    yield information(
         "start-at-speed", names,
         f"the scene starts with speeds ({names}) that last, but this model is that at rest, "
         "without what they do",
@@ -50,12 +50,12 @@ def find_start_risks(linear: Equations, most: int) -> Iterator[Risk]:
     )  # fmt: skip
 
 
-def _fastest(linear: Equations, speeds: Array) -> float:
+def _fastest(linear: LinearEquations, speeds: Array) -> float:
     """The largest of the speeds (n,), in sizes a second."""
-    return float(np.abs(speeds / speed_sizes(linear.model)[list(linear.free)]).max())
+    return float(np.abs(speeds / speed_scales(linear.model)[list(linear.free)]).max())
 
 
-def _lasting(linear: Equations, speeds: Array) -> Array:
+def _lasting(linear: LinearEquations, speeds: Array) -> Array:
     """The part of the speeds (n,) that nothing pushes back or slows down within a turn."""
     scale = np.sqrt(linear.M.diagonal())
     fastest, stiffness = _fastest(linear, speeds), linear.K / np.outer(scale, scale)
@@ -66,7 +66,7 @@ def _lasting(linear: Equations, speeds: Array) -> Array:
     return lasting if slowed < _SLOW * fastest * energy else np.zeros_like(lasting)
 
 
-def _matter(linear: Equations, speeds: Array) -> bool:
+def _matter(linear: LinearEquations, speeds: Array) -> bool:
     """Whether the matrices beside these speeds (n,) are others than at rest."""
     assert linear.at_speeds is not None
     try:

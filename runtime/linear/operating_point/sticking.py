@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import lstsq
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
-from ...engine.sizes import speed_sizes
+from ...engine.characteristic_scales import speed_scales
 from .friction import Rubbing
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: Part of a radian or a length of the scene below which sticking is no doubt.
 _SMALL = 0.01
@@ -37,13 +37,13 @@ _NEAR, _STEADY, _CREEP = (1e-6, 1e-8), 0.5, 1e-6
 _LISTED, _SOFT = 4, 1e-12
 
 
-def friction_risks(linear: Equations) -> Iterator[Risk]:
+def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
     """One risk for all hinges whose friction is left out: the amplitude below which they stick."""
     left = [one for one in linear.dry.rubbing.values() if not one.given] if linear.dry else []
     if not left:
         return
     amplitudes = _stuck_below(linear, left)
-    sizes = speed_sizes(linear.model)[[one.speed for one in left]]
+    sizes = speed_scales(linear.model)[[one.speed for one in left]]
     order = np.argsort(-amplitudes / sizes, kind="stable")
     layout, worst = linear.model.layout, int(order[0])
     listed = [
@@ -75,16 +75,16 @@ class Ways:
     onto: Callable[[Array], Array]
 
 
-def ways_of(linear: Equations) -> Ways:
+def ways_of(linear: LinearEquations) -> Ways:
     """Those of x, of a rotor in axes that turn along with it."""
     plain, free, loops = replace(linear, carrying=None), list(linear.free), linear.mechanism
     return Ways(
-        linear.coordinates, linear.units, speed_sizes(linear.model)[free], plain.spread,
+        linear.coordinates, linear.units, speed_scales(linear.model)[free], plain.spread,
         lambda efforts: efforts[free] if loops is None else loops.ways.T @ efforts,
     )  # fmt: skip
 
 
-def saturation_risks(linear: Equations, ways: Ways) -> Iterator[Risk]:
+def saturation_risks(linear: LinearEquations, ways: Ways) -> Iterator[Risk]:
     """Coordinates with friction that an expression describes: an effort that jumps with speeds at
     the state, -10*sign(u), or damping that is that of small speeds alone, -10*tanh(u/0.001)."""
     n = len(ways.sizes)
@@ -110,7 +110,7 @@ def saturation_risks(linear: Equations, ways: Ways) -> Iterator[Risk]:
             yield _saturated_risk(name, ways, k, float(parts[k]))
 
 
-def _work(linear: Equations, ways: Ways, signs: Array) -> Callable[[float], Array]:
+def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float], Array]:
     """The function of a speed, in sizes a second, that gives (k, n) how much larger efforts along
     the coordinates are at this speed with `signs` (k, n) than at the opposite one; at 0, at an
     acceleration of one size/s^2.  Of single coordinates (n, n) each has its own alone, (1, n)."""
@@ -164,12 +164,12 @@ def _sentence(name: str, unit: str, amplitude: float, static: float) -> str:
     return f"{hinge} below an amplitude of {amplitude:.4g} {unit} or efforts of {effort}"
 
 
-def _unit(linear: Equations, speed: int) -> str:
+def _unit(linear: LinearEquations, speed: int) -> str:
     slots = linear.model.layout.hinge_of_speed(speed)
     return slots.u_units[speed - slots.u].removesuffix("/s")
 
 
-def _stuck_below(linear: Equations, left: list[Rubbing]) -> Array:
+def _stuck_below(linear: LinearEquations, left: list[Rubbing]) -> Array:
     """(k,) how far static friction holds each of some speeds against the stiffness there is, all
     other coordinates following; infinite where there is none."""
     ways = np.zeros((len(left), len(linear)))
@@ -181,12 +181,12 @@ def _stuck_below(linear: Equations, left: list[Rubbing]) -> Array:
         places = {speed: k for k, speed in enumerate(linear.free)}
         for row, one in zip(ways, left, strict=True):
             row[places[one.speed]] = 1.0
-    sizes = speed_sizes(linear.model)[list(linear.free)]
+    sizes = speed_scales(linear.model)[list(linear.free)]
     stiffness, rows = linear.K * np.outer(sizes, sizes), ways * sizes
     moved = lstsq(stiffness, rows.T, cond=_SOFT, lapack_driver="gelsy")[0]
     missing = np.abs(stiffness @ moved - rows.T).max(axis=0, initial=0.0)
     held = missing <= 1e-6 * np.abs(rows).max(axis=1, initial=0.0)
     flexibility = np.abs(np.einsum("kn,nk->k", rows, moved))
     found = np.array([one.static for one in left]) * flexibility
-    far = _FAR * speed_sizes(linear.model)[[one.speed for one in left]]
+    far = _FAR * speed_scales(linear.model)[[one.speed for one in left]]
     return np.where(held & (found > 0) & (found < far), found, np.inf)

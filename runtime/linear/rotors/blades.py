@@ -21,14 +21,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array, Integers
+from mstmm.array_validation import Array, Integers
 
-from ...engine.calls import Probe
-from ...engine.shown import COLUMNS
+from ...engine.engine_calls import Probe
+from ...engine.observation_columns import POINT_COLUMNS
 
 if TYPE_CHECKING:
-    from ...pack.packed import Packed
-    from ..equations import Equations
+    from ...packing.packed_scene import PackedScene
+    from ..linear_equations import LinearEquations
 
 #: Fewest blades whose coefficients stay constant in the fixed frame.
 _FEWEST = 3
@@ -69,7 +69,7 @@ class _Branch:
     form: tuple[object, ...]
 
 
-def find_blades(linear: Equations) -> list[Blades]:
+def find_blades(linear: LinearEquations) -> list[Blades]:
     """Groups of equal branches around spinning bodies, at equal angles about their axes."""
     packed = linear.model.looped.packed
     points = _mass_centres(linear)
@@ -85,7 +85,7 @@ def find_blades(linear: Equations) -> list[Blades]:
     return found
 
 
-def _branch(linear: Equations, packed: Packed, root: int) -> _Branch:
+def _branch(linear: LinearEquations, packed: PackedScene, root: int) -> _Branch:
     """The branch from a body outwards; its form are the hinges and free increments, in order."""
     bodies, coordinates, form = [], list[int](), list[object]()
     places = {speed: k for k, speed in enumerate(linear.free)}
@@ -102,7 +102,7 @@ def _branch(linear: Equations, packed: Packed, root: int) -> _Branch:
     return _Branch(tuple(bodies), tuple(coordinates), tuple(form))
 
 
-def _outwards(packed: Packed, root: int) -> Iterator[int]:
+def _outwards(packed: PackedScene, root: int) -> Iterator[int]:
     """A body and all that hang on it, depth first."""
     waiting = [root]
     while waiting:
@@ -111,7 +111,7 @@ def _outwards(packed: Packed, root: int) -> Iterator[int]:
         waiting += reversed(packed.topology.links[place].children)
 
 
-def _mass_centres(linear: Equations) -> Array:
+def _mass_centres(linear: LinearEquations) -> Array:
     """(bodies, 24) of mass centres in the order of the tree, as of `Observation.points`."""
     packed, state, engine = linear.model.looped.packed, linear.state, linear.model.looped
     names = [packed.scene.bodies.name(body) for body in packed.topology.order]
@@ -124,7 +124,7 @@ def _mass_centres(linear: Equations) -> Array:
 def _arranged(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
     """The branches in the order of their azimuths about the axis of the hub, where these are equal
     angles apart."""
-    spin = points[hub, COLUMNS["angular_velocity"]]
+    spin = points[hub, POINT_COLUMNS["angular_velocity"]]
     speed = float(np.linalg.norm(spin))
     if len(group) < _FEWEST or not speed:
         return None

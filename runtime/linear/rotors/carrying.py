@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ..matrices import Matrices
+from ..mck_matrices import Matrices
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ...engine.calls import Probe
-from ...engine.shown import COLUMNS, SUMS
-from ...engine.sizes import scene_length
-from ..matrices import State
+from ...engine.characteristic_scales import scene_length
+from ...engine.engine_calls import Probe
+from ...engine.observation_columns import POINT_COLUMNS, SUMS
+from ..mck_matrices import State
 from .blades import find_blades
 
 if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: Squares of sums of displacements that are rounding, in parts of those of the displacements.
 _SEEN = 1e-18
@@ -25,19 +25,19 @@ _SEEN = 1e-18
 _NO_DRIFT = 1e-7
 
 
-def displacements(linear: Equations, state: State) -> Array:
+def displacements(linear: LinearEquations, state: State) -> Array:
     """(rows, n): twists of all bodies and of sections of beams for a unit of each increment, of the
     point at the origin of inertial axes, which goes along with the mean motion; rotations count as
     a length of the scene."""
     length = scene_length(linear.model)
     points = _points(linear, state, linear.spread(np.eye(len(linear))).T)
-    place, velocity, spin = (points[..., COLUMNS[kind]] for kind in _KINDS)
+    place, velocity, spin = (points[..., POINT_COLUMNS[kind]] for kind in _KINDS)
     centre = state.t * _drift(linear)
     found = np.concatenate([velocity + np.cross(spin, centre - place), length * spin], axis=1)
     return np.asarray(found.reshape(len(linear), -1).T)
 
 
-def whirl(linear: Equations, shapes: NDArray[Any]) -> Array:
+def whirl(linear: LinearEquations, shapes: NDArray[Any]) -> Array:
     """(k,) sense of the whirl of complex shapes (n, k) about the angular velocity of the body that
     spins fastest: 1 forward along a circle, -1 backward, between these along ellipses, 0 in a
     plane or along the axis.  Blades whirl by their sum, which is that of their mass centre."""
@@ -52,7 +52,7 @@ def whirl(linear: Equations, shapes: NDArray[Any]) -> Array:
     return np.divide(area, size, out=np.zeros_like(area), where=seen)
 
 
-def _sum_of_blades(linear: Equations, rows: NDArray[Any]) -> NDArray[Any]:
+def _sum_of_blades(linear: LinearEquations, rows: NDArray[Any]) -> NDArray[Any]:
     """(2, m, 3, k) of displacements (2, points, 3, k), of points of blades their sums."""
     if not linear.state.u.any():
         return rows
@@ -72,7 +72,7 @@ def _sum_of_blades(linear: Equations, rows: NDArray[Any]) -> NDArray[Any]:
 _KINDS = "position", "velocity", "angular_velocity"
 
 
-def _points(linear: Equations, state: State, speeds: Array) -> Array:
+def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
     """(m, points, 24), as of `Observation.points`, at speeds (m, nu): frames and ends of bodies,
     of beams sections instead."""
     packed, engine = linear.model.looped.packed, linear.model.looped.inertia_alone
@@ -93,7 +93,7 @@ def _points(linear: Equations, state: State, speeds: Array) -> Array:
     return np.concatenate([points, *along], axis=1)
 
 
-def _bodies_of_points(linear: Equations) -> list[int]:
+def _bodies_of_points(linear: LinearEquations) -> list[int]:
     """Positions in the tree of the bodies of all `_points`."""
     end, bodies = linear.model.looped.packed.end, linear.model.scene.skeleton.bodies
     found = [end(bodies.name(k))[0] for k in range(len(bodies))]
@@ -104,7 +104,7 @@ def _bodies_of_points(linear: Equations) -> list[int]:
     return found
 
 
-def _beams(linear: Equations) -> dict[str, ModalBody]:
+def _beams(linear: LinearEquations) -> dict[str, ModalBody]:
     flexible = linear.model.flexible
     return {name: body for name, body in flexible.items() if body.shapes is not None}
 
@@ -124,42 +124,44 @@ def _sections(body: ModalBody, frame: Array, rates: Array) -> Array:
     values, rotation = shapes.at(x), frame[:, 15:24].reshape(-1, 1, 3, 3)
     found = np.repeat(frame[:, None], len(x), axis=1)
     arm = rotation[..., 0] * x[:, None]
-    velocity, spin = COLUMNS["velocity"], COLUMNS["angular_velocity"]
+    velocity, spin = POINT_COLUMNS["velocity"], POINT_COLUMNS["angular_velocity"]
     for columns, field in ((velocity, values.phi), (spin, values.theta)):
         own = np.einsum("xik,mk->mxi", field, rates)
         found[..., columns] += np.einsum("mxij,mxj->mxi", np.broadcast_to(
             rotation, (len(frame), len(x), 3, 3)), own)  # fmt: skip
     found[..., velocity] += np.cross(frame[:, None, spin], arm)
-    found[..., COLUMNS["position"]] += arm
+    found[..., POINT_COLUMNS["position"]] += arm
     return found
 
 
-def _drift(linear: Equations) -> Array:
+def _drift(linear: LinearEquations) -> Array:
     """(3,) velocity of the body that turns least, where the scene has linear momentum."""
     state, engine = linear.state, linear.model.looped
     of = np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None]
     sums = engine.observe(*of, (), parts=("sums",)).sums[0]
     points = _points(linear, state, state.u[None])[0]
-    size = np.linalg.norm(points[:, COLUMNS["velocity"]], axis=1).max()
+    size = np.linalg.norm(points[:, POINT_COLUMNS["velocity"]], axis=1).max()
     momentum = np.linalg.norm(sums[SUMS["momentum"][2]]) * size
     if momentum <= _NO_DRIFT * sums[SUMS["energy.kinetic"][2]]:
         return np.zeros(3)
-    least = np.linalg.norm(points[:, COLUMNS["angular_velocity"]], axis=1).argmin()
-    return np.asarray(points[least, COLUMNS["velocity"]])
+    least = np.linalg.norm(points[:, POINT_COLUMNS["angular_velocity"]], axis=1).argmin()
+    return np.asarray(points[least, POINT_COLUMNS["velocity"]])
 
 
-def angular_velocity(linear: Equations, name: str) -> Array:
+def angular_velocity(linear: LinearEquations, name: str) -> Array:
     """(3,) angular velocity of a body or end at the state, rad/s, inertial axes."""
     engine, state = linear.model.looped, linear.state
     of = np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None]
     probe = Probe(*linear.model.looped.packed.end(name))
     points = engine.observe(*of, [probe], parts=("points",)).points
-    return np.asarray(points[0, 0, COLUMNS["angular_velocity"]])
+    return np.asarray(points[0, 0, POINT_COLUMNS["angular_velocity"]])
 
 
-def _spin(linear: Equations) -> Array:
+def _spin(linear: LinearEquations) -> Array:
     """(3,) unit vector of the largest angular velocity of a body, of the x axis without spin."""
-    turns = _points(linear, linear.state, linear.state.u[None])[0, :, COLUMNS["angular_velocity"]]
+    turns = _points(linear, linear.state, linear.state.u[None])[
+        0, :, POINT_COLUMNS["angular_velocity"]
+    ]
     fastest = turns[np.linalg.norm(turns, axis=1).argmax()]
     size = float(np.linalg.norm(fastest))
     return np.asarray(fastest / size) if size else np.array([1.0, 0.0, 0.0])

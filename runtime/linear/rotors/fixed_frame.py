@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import logm
 
-from mstmm.arrays import Array, Integers
+from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
-from mstmm.printable import abbreviate
+from mstmm.safe_text import abbreviate_names
 
 from .blades import find_blades
 from .carrying import Carrying
@@ -31,7 +31,7 @@ from .displacements import displacements
 from .later import SAME, ahead, later
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: Displacements that count as the same, in parts; entries of matrices that are rounding, in parts.
 _ALIKE, _ROUNDING = 1e-7, 1e-11
@@ -39,19 +39,19 @@ _ALIKE, _ROUNDING = 1e-7, 1e-11
 _SEEN = 1e-9
 
 
-def frame_of(linear: Equations) -> str:
+def frame_of(linear: LinearEquations) -> str:
     """Frame of increments: "rotating" where they turn along with spinning bodies, else "fixed"."""
     return "rotating" if _is_rotating(linear) else "fixed"
 
 
-def _is_rotating(linear: Equations) -> bool:
+def _is_rotating(linear: LinearEquations) -> bool:
     if linear.carrying is not None or not len(linear) or not linear.state.u.any():
         return False
     now, then = (displacements(linear, state) for state in (linear.state, ahead(linear)))
     return bool(np.abs(then - now).max() > _ALIKE * np.abs(now).max(initial=0))
 
 
-def carrying_at(linear: Equations) -> Carrying:
+def carrying_at(linear: LinearEquations) -> Carrying:
     """The transformation at the state of a linear model.
 
     Raises SceneError where the rotor is not axisymmetric, saying why.
@@ -73,7 +73,7 @@ def carrying_at(linear: Equations) -> Carrying:
     return carrying
 
 
-def _turned(linear: Equations, there: Equations, others: Integers) -> Array:
+def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -> Array:
     """T of the later state, of the increments (m,) that are not of blades."""
     now = displacements(linear, linear.state)[:, others]
     then = displacements(there, there.state)[:, others]
@@ -86,11 +86,11 @@ def _turned(linear: Equations, there: Equations, others: Integers) -> Array:
     left = np.abs(unit @ found - then).max(axis=0) / np.linalg.norm(then, axis=0)
     if (left > _ALIKE).any():
         names = [linear.coordinates[k] for k in others[left > _ALIKE]]
-        raise _no_frame(f"what {abbreviate(names)} displaces changes its shape as it turns")
+        raise _no_frame(f"what {abbreviate_names(names)} displaces changes its shape as it turns")
     return np.asarray(found / size[:, None])
 
 
-def _refuse_asymmetric(linear: Equations) -> None:
+def _refuse_asymmetric(linear: LinearEquations) -> None:
     """SceneError where the matrices of y change along the motion."""
     there = later(linear)
     scale = 1 / np.sqrt(np.abs(np.diag(linear.M)))
@@ -104,7 +104,7 @@ def _refuse_asymmetric(linear: Equations) -> None:
         wrong = np.abs(one - other) > allowed
         if wrong.any():
             names = [linear.coordinates[k] for k in np.flatnonzero(wrong.any(axis=0))]
-            raise _no_frame(f"{_NAMES[name]} of {abbreviate(names)} changes as it turns")
+            raise _no_frame(f"{_NAMES[name]} of {abbreviate_names(names)} changes as it turns")
 
 
 _NAMES = {"M": "the inertia", "C": "the damping or gyroscopic load", "K": "the stiffness"}

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
-from ...engine.states.steady_motion import move_steadily
-from ...run.system import SceneSystem
-from ..matrices import State
+from ...engine.state_evaluation.steady_motion import move_steadily
+from ...run.scene_system import SceneSystem
+from ..mck_matrices import State
 
 if TYPE_CHECKING:
-    from ..equations import Equations
+    from ..linear_equations import LinearEquations
 
 #: Matrices that still count as the same, in parts.
 SAME = 1e-6
@@ -22,7 +22,7 @@ SAME = 1e-6
 _AHEAD = 0.1
 
 
-def later(linear: Equations) -> Equations:
+def later(linear: LinearEquations) -> LinearEquations:
     """The equations a little further along the motion."""
     state, loops = ahead(linear), linear.mechanism
     loops = None if loops is None else loops.at(state)
@@ -35,7 +35,7 @@ def later(linear: Equations) -> Equations:
     )
 
 
-def ahead(linear: Equations) -> State:
+def ahead(linear: LinearEquations) -> State:
     """The state a little further along the motion, with the same speeds."""
     model, state = linear.model, linear.state
     engine, memory = model.looped, model.looped.start_memory()

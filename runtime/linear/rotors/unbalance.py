@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arguments import short
-from mstmm.arrays import Array, real
+from mstmm.argument_validation import abbreviate
+from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
-from mstmm.risk import Assessed, DeferredRisks, Risk
+from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
 
-from ...engine.references import References
-from ...guard.answers import merge_over_values
-from .. import files
+from ...engine.body_references import BodyReferences
+from ...risk_checks.answers import merge_over_values
+from .. import file_formats
 from .displacements import angular_velocity
 
 if TYPE_CHECKING:
-    from ..linear import Linear
+    from ..linear_model import Linear
 
 Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class UnbalanceResponse(Assessed):
+class UnbalanceResponse(AssessedAnswer):
     """Whirl of points under an unbalance m e that turns with a body, in the fixed frame.
 
     Attributes:
@@ -72,7 +72,7 @@ class UnbalanceResponse(Assessed):
 
         Raises EnvironmentFailure without the extra `plot`.
         """
-        from ..pictures.curves import unbalance
+        from ..plots.bode_and_locus import unbalance
 
         return unbalance(self.spin, self.amplitude, self.points, path)
 
@@ -87,7 +87,7 @@ class UnbalanceResponse(Assessed):
         }  # fmt: skip
         coords = {"value": self.values, "point": list(self.points), "axis": ["x", "y", "z"]}
         about = {"parameter": self.parameter, "at": self.at, "unbalance": self.unbalance}
-        return files.xarray().Dataset(arrays, coords, about)
+        return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """A row for each value of the parameter."""
@@ -106,7 +106,7 @@ class UnbalanceResponse(Assessed):
 
         Raises SceneError for another ending, EnvironmentFailure without the extra.
         """
-        return files.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_dataset, self._rows())
 
 
 def unbalance_response(
@@ -118,7 +118,7 @@ def unbalance_response(
     points: Sequence[str],
 ) -> UnbalanceResponse:
     """See `Model.unbalance_response`."""
-    size = real("unbalance", unbalance, "m e in kg m")
+    size = finite_float("unbalance", unbalance, "m e in kg m")
     models = [linear_at(value).to_fixed_frame() for value in values.tolist()]
     places = [_end(models[0], name) for name in (at, *points)]
     axes = [angular_velocity(linear, at) for linear in models]
@@ -139,9 +139,9 @@ def unbalance_response(
 
 
 def _end(linear: Linear, name: str) -> str:
-    ends = References(linear.model.scene.skeleton)
+    ends = BodyReferences(linear.model.scene.skeleton)
     if not isinstance(name, str) or name not in ends:
-        raise SceneError(f'{short(name)}: expected a body or an end of one, such as "disc"')
+        raise SceneError(f'{abbreviate(name)}: expected a body or an end of one, such as "disc"')
     return ends.canonical(name) or name
 
 

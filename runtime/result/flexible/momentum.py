@@ -13,24 +13,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
 from ...flexible.kernel_inputs import moments_of
 from ...flexible.modal_kernels import kernel
-from ...kernels.vectorized import evaluate
+from ...kernels.numpy_kernels import evaluate
 from .motion import tilde
 
 if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
-    from .bodies import FlexibleBodies
+    from .body_motions import FlexibleBodies
     from .motion import Motion
 
 
 #: Part of the largest moment of inertia below which there is none.
-_NO_INERTIA = 1e-12
+_ZERO_INERTIA_RATIO = 1e-12
 
-_UPPER = np.triu_indices(6)
+_UPPER_TRIANGLE = np.triu_indices(6)
 
 
 @dataclass(frozen=True)
@@ -55,47 +55,47 @@ class Momenta:
     def of(self, name: str) -> Momentum:
         """SceneError for a body that is not there, and for one without mass."""
         references = self.observed.references
-        known = references.canonical(name)
-        if known is None or references.bodies.find(known) is None:
+        canonical_name = references.canonical(name)
+        if canonical_name is None or references.bodies.find(canonical_name) is None:
             raise SceneError(self.observed.references.unknown(name))
-        if known not in self._known:
-            of = self._of_flexible if known in self.flexible.known else self._of_rigid
-            self._known[known] = of(known)
-        return self._known[known]
+        if canonical_name not in self._known:
+            compute = self._of_flexible if canonical_name in self.flexible.known else self._of_rigid
+            self._known[canonical_name] = compute(canonical_name)
+        return self._known[canonical_name]
 
     def _of_rigid(self, name: str) -> Momentum:
         """A rigid body moves as it is: momentum of its inertia matrix with its own motion."""
-        mass, center, about = self._inertia(name)
+        mass, center, inertia = self._inertia(name)
         points = self.observed.node(name)
-        turn = points[:, 15:24].reshape(-1, 3, 3)
-        spin, arm = points[:, 9:12], turn @ center
+        rotation = points[:, 15:24].reshape(-1, 3, 3)
+        spin, arm = points[:, 9:12], rotation @ center
         velocity = points[:, 3:6] + np.cross(spin, arm)
-        own = np.einsum("tij,jk,tlk,tl->ti", turn, about, turn, spin)
-        return Momentum(mass * velocity, own, points[:, 0:3] + arm, velocity, spin)
+        angular = np.einsum("tij,jk,tlk,tl->ti", rotation, inertia, rotation, spin)
+        return Momentum(mass * velocity, angular, points[:, 0:3] + arm, velocity, spin)
 
     def _inertia(self, name: str) -> tuple[float, Array, Array]:
         """Mass, mass centre in the user's axes and inertia about it in them, from the kernel that
         the engine takes them from."""
         packed = self.observed.apart.engine.packed
-        place, axes, offset = packed.end(name)
-        body, ffi, numbers = packed.system.body(place), packed.ffi, np.zeros(21)
-        function = packed.elements[body.body].functions["inertia"]
-        inertia = ffi.cast("void (*)(const double *, double *)", function)
+        body_index, axes, offset = packed.end(name)
+        body, ffi, numbers = packed.system.body(body_index), packed.ffi, np.zeros(21)
+        kernel_pointer = packed.elements[body.body].functions["inertia"]
+        inertia = ffi.cast("void (*)(const double *, double *)", kernel_pointer)
         inertia([*body.body_p, *body.body_frame], ffi.from_buffer("double[]", numbers))
         matrix = np.zeros((6, 6))
-        matrix[_UPPER] = numbers
+        matrix[_UPPER_TRIANGLE] = numbers
         matrix = matrix + np.triu(matrix, 1).T
         mass = float(matrix[0, 0])
         if not mass > 0:
             raise SceneError(f'"{name}": a body without mass has no equivalent velocity')
-        return mass, *moved(matrix, np.array(axes).reshape(3, 3), np.array(offset))
+        return mass, *shift_inertia(matrix, np.array(axes).reshape(3, 3), np.array(offset))
 
     def _of_flexible(self, name: str) -> Momentum:
         motion = self.flexible.motion(name)
         if motion.body.points:
             return self._of_points(motion)
         linear, about_origin, first = frame_momentum(motion)
-        return equivalent(motion, linear, about_origin, first / motion.body.mass)
+        return equivalent_momentum(motion, linear, about_origin, first / motion.body.mass)
 
     def _of_points(self, motion: Motion) -> Momentum:
         """A body whose mass stands in points: theirs summed up."""
@@ -103,44 +103,50 @@ class Momenta:
         for k in range(len(motion.body.points)):
             parts.append(self._of_rigid(f"{name}/point {k + 1}"))
         linear = np.sum([part.linear for part in parts], axis=0)
-        about = np.sum([part.angular for part in parts], axis=0)
+        angular = np.sum([part.angular for part in parts], axis=0)
         first = np.zeros_like(linear)
         for part, point in zip(parts, motion.body.points, strict=True):
             arm = part.center - motion.position
-            about = about + np.cross(arm, part.linear)
+            angular = angular + np.cross(arm, part.linear)
             first += point.mass * arm
         center = first / sum(point.mass for point in motion.body.points)
         inward = motion.inward
-        return equivalent(motion, inward(linear), inward(about), inward(center))
+        return equivalent_momentum(motion, inward(linear), inward(angular), inward(center))
 
 
-def moved(matrix: Array, axes: Array, offset: Array) -> tuple[Array, Array]:
+def shift_inertia(matrix: Array, axes: Array, offset: Array) -> tuple[Array, Array]:
     """Mass centre (3,) and inertia (3, 3) about it in the user's axes, from an inertia matrix in
     the engine's: `axes` (3, 3) and `offset` (3,) are those of a probe of the user's axes."""
     mass = matrix[0, 0]
     center = np.array([matrix[5, 1], matrix[3, 2], matrix[4, 0]]) / mass
-    about = matrix[3:, 3:] + mass * (tilde(center) @ tilde(center))
-    return axes.T @ (center - offset), axes.T @ about @ axes
+    inertia = matrix[3:, 3:] + mass * (tilde(center) @ tilde(center))
+    return axes.T @ (center - offset), axes.T @ inertia @ axes
 
 
-def equivalent(motion: Motion, linear: Array, about_origin: Array, center: Array) -> Momentum:
+def equivalent_momentum(
+    motion: Motion, linear: Array, about_origin: Array, center: Array
+) -> Momentum:
     """Equivalent velocity and spin from the momentum (n, 3), the moment of momentum about the
     frame's origin and the mass centre, frame axes.
 
     About an axis without inertia (that of a beam without polar inertia) the spin is given as zero.
     """
-    mass, inertia = undeformed(motion.body)
-    about = about_origin - np.cross(center, linear)
-    spin = about @ np.linalg.pinv(inertia, rcond=_NO_INERTIA, hermitian=True)
-    out = motion.outward
+    mass, inertia = undeformed_inertia(motion.body)
+    angular = about_origin - np.cross(center, linear)
+    spin = angular @ np.linalg.pinv(inertia, rcond=_ZERO_INERTIA_RATIO, hermitian=True)
+    outward = motion.outward
     return Momentum(
-        out(linear), out(about), motion.position + out(center), out(linear) / mass, out(spin)
+        outward(linear),
+        outward(angular),
+        motion.position + outward(center),
+        outward(linear) / mass,
+        outward(spin),
     )
 
 
-def undeformed(body: ModalBody) -> tuple[float, Array]:
+def undeformed_inertia(body: ModalBody) -> tuple[float, Array]:
     """Mass, and inertia (3, 3) about the mass centre of the undeformed body, frame axes."""
-    mass, first, second, own = body.mass, body.first, body.second, np.zeros((3, 3))
+    mass, first, second, point_inertia = body.mass, body.first, body.second, np.zeros((3, 3))
     if body.points:
         mass = sum(p.mass for p in body.points)
         first = sum((p.mass * p.port.position for p in body.points), np.zeros(3))
@@ -148,36 +154,36 @@ def undeformed(body: ModalBody) -> tuple[float, Array]:
             (p.mass * np.outer(p.port.position, p.port.position) for p in body.points),
             np.zeros((3, 3)),
         )
-        own = sum((p.inertia for p in body.points), np.zeros((3, 3)))
+        point_inertia = sum((p.inertia for p in body.points), np.zeros((3, 3)))
     center = first / mass
     inner = second - mass * np.outer(center, center)
-    return mass, np.trace(inner) * np.eye(3) - inner + own
+    return mass, np.trace(inner) * np.eye(3) - inner + point_inertia
 
 
 #: Numbers of one batch of samples, about 30 MB an array.
-_BATCH = 2**22
+_MAX_BATCH_NUMBERS = 2**22
 
 
 def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
     """Linear momentum in kg*m/s, moment of momentum about the frame's origin in kg*m2/s and first
     moment of the mass in kg*m, (n, 3) each, frame axes; by the kernel `momentum`."""
     body, parts = motion.body, []
-    rows = max(1, _BATCH // max(1, body.n**2 * 8))
+    rows = max(1, _MAX_BATCH_NUMBERS // max(1, body.n**2 * 8))
     for first in range(0, len(motion.t), rows):
-        some = slice(first, first + rows)
-        given = {
-            **moments_of(body), "eta": motion.eta[some], "etad": motion.etad[some],
-            "v": motion.frame_velocity[some], "w": motion.frame_spin[some],
+        samples = slice(first, first + rows)
+        inputs = {
+            **moments_of(body), "eta": motion.eta[samples], "etad": motion.etad[samples],
+            "v": motion.frame_velocity[samples], "w": motion.frame_spin[samples],
         }  # fmt: skip
-        found = evaluate(kernel("momentum"), given, body.n)
-        parts.append(np.concatenate([found["h"], found["S"]], axis=1))
-    whole = np.concatenate(parts) if parts else np.zeros((0, 27))
-    inertia = _inertia(whole[:, 6:])
+        outputs = evaluate(kernel("momentum"), inputs, body.n)
+        parts.append(np.concatenate([outputs["h"], outputs["S"]], axis=1))
+    sums = np.concatenate(parts) if parts else np.zeros((0, 27))
+    inertia = _inertia_from_upper(sums[:, 6:])
     moment = np.stack([inertia[:, 5, 1], inertia[:, 3, 2], inertia[:, 4, 0]], axis=1)
-    return whole[:, :3], whole[:, 3:6], moment
+    return sums[:, :3], sums[:, 3:6], moment
 
 
-def _inertia(upper: Array) -> Array:
+def _inertia_from_upper(upper: Array) -> Array:
     """(n, 6, 6) symmetric matrices from their upper triangles (n, 21), row by row."""
     full = np.zeros((len(upper), 6, 6))
     full[:, *np.triu_indices(6)] = upper

@@ -15,17 +15,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array, numbers
+from mstmm.array_validation import Array, finite_array
 from mstmm.errors import SceneError
 
 if TYPE_CHECKING:
-    from ...flexible.beam.ports import BeamShapes
+    from ...flexible.beam.section_ports import BeamShapes
     from ...flexible.beam.shape_fields import ShapeValues
     from ...flexible.modal_body import ModalBody
 
 
 #: A section may lie this part of the length beyond the ends: rounding of the user's numbers.
-_BEYOND = 1e-9
+_LENGTH_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,8 @@ class Motion:
     def some(self, samples: Any) -> Motion:
         """The same at some samples: a slice or indices."""
         arrays = {k: v[samples] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
-        kept = {name: arrays[name] for name in _ARRAYS}
-        return Motion(self.body, **kept)
+        sampled = {name: arrays[name] for name in _ARRAYS}
+        return Motion(self.body, **sampled)
 
     @property
     def shapes(self) -> BeamShapes:
@@ -115,16 +115,18 @@ def shapes_of(body: ModalBody, what: str) -> BeamShapes:
     return body.shapes
 
 
-def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
+def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
     """x in m as (m,); SceneError for a place off the beam or a number that is none."""
     length = float(shapes_of(body, what).length)
-    places = np.atleast_1d(numbers(f'{what} of "{body.name}": x', x))
+    places = np.atleast_1d(finite_array(f'{what} of "{body.name}": x', x))
     if places.ndim != 1:
         raise SceneError(f"{what}: x has shape {places.shape}, expected one number or (m,)")
-    off = ~((places >= -_BEYOND * length) & (places <= length * (1 + _BEYOND)))
-    if off.any():
+    is_off_beam = ~(
+        (places >= -_LENGTH_TOLERANCE * length) & (places <= length * (1 + _LENGTH_TOLERANCE))
+    )
+    if is_off_beam.any():
         raise SceneError(
-            f'{what} of "{body.name}": x = {places[off][0]:g} m lies off the beam; '
+            f'{what} of "{body.name}": x = {places[is_off_beam][0]:g} m lies off the beam; '
             f"expected 0 to {length:g} m"
         )
     return np.asarray(np.clip(places, 0.0, length))
@@ -133,40 +135,42 @@ def stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
 def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
     """Values of the shapes at x (m,), kept for the next who asks for the same places, if they are
     not too many."""
-    if len(places) * shapes.n > _MOST_KEPT:
+    if len(places) * shapes.n > _MAX_CACHED_VALUES:
         return shapes.at(places)
-    return _kept(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
+    return _cached_values(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
 
 
 #: Values of shapes at sections that are kept.
-_MOST_KEPT = 2**17
+_MAX_CACHED_VALUES = 2**17
 
 
 @lru_cache(maxsize=16)
-def _kept(shapes: BeamShapes, places: bytes) -> ShapeValues:
+def _cached_values(shapes: BeamShapes, places: bytes) -> ShapeValues:
     return shapes.at(np.frombuffer(places))
 
 
 def deflection(motion: Motion, places: Array) -> Array:
     """(n, m, 3) elastic displacement in m of the axis at x, frame axes, second order included."""
-    first = to_first_order(values_at(motion.shapes, places).phi, motion.eta)
-    return first - 0.5 * drawn(motion, places, "eta", "eta")[..., :3]
+    first = first_order_field(values_at(motion.shapes, places).phi, motion.eta)
+    return first - 0.5 * second_order_motion(motion, places, "eta", "eta")[..., :3]
 
 
-def turns(motion: Motion, places: Array) -> Array:
+def rotation_vectors(motion: Motion, places: Array) -> Array:
     """(n, m, 3) rotation vectors in rad of the sections against the frame, second order included:
     to first order twist, -w', v'."""
-    first = to_first_order(values_at(motion.shapes, places).theta, motion.eta)
-    return first - 0.5 * drawn(motion, places, "eta", "eta")[..., 3:]
+    first = first_order_field(values_at(motion.shapes, places).theta, motion.eta)
+    return first - 0.5 * second_order_motion(motion, places, "eta", "eta")[..., 3:]
 
 
-def to_first_order(field: Array, modal: Array) -> Array:
+def first_order_field(field: Array, modal: Array) -> Array:
     """(n, m, 3) of a field (m, 3, modes) and modal coordinates or their rates (n, modes)."""
     flat = field.reshape(-1, field.shape[-1])
     return np.asarray((modal @ flat.T).reshape(len(modal), *field.shape[:-1]))
 
 
-def drawn(motion: Motion, places: Array, a: str, b: str, carried: bool = False) -> Array:
+def second_order_motion(
+    motion: Motion, places: Array, a: str, b: str, carried: bool = False
+) -> Array:
     """(n, m, 6) displacement and rotation a^T g b of second order at x, for a and b among eta, etad
     and etadd; zeros of a linear beam; `carried` as in `SecondOrder`."""
     if not motion.shapes.stiffening:
@@ -177,17 +181,17 @@ def drawn(motion: Motion, places: Array, a: str, b: str, carried: bool = False) 
 
 def slope(motion: Motion, places: Array) -> Array:
     """(n, m, 2) slopes v', w' of the axis against the frame's x axis."""
-    turned = turns(motion, places)
-    return np.stack([turned[:, :, 2], -turned[:, :, 1]], axis=2)
+    rotation = rotation_vectors(motion, places)
+    return np.stack([rotation[:, :, 2], -rotation[:, :, 1]], axis=2)
 
 
 def curvature(motion: Motion, places: Array) -> Array:
     """(n, m, 2) curvature in 1/m about y, -w'', and about z, v''."""
-    bent = values_at(motion.shapes, places).curvature[:, 1:]
-    return np.einsum("mak,tk->tma", bent, motion.eta)
+    curvature_of_modes = values_at(motion.shapes, places).curvature[:, 1:]
+    return np.einsum("mak,tk->tma", curvature_of_modes, motion.eta)
 
 
-def shape(motion: Motion, places: Array) -> Array:
+def deflected_axis(motion: Motion, places: Array) -> Array:
     """(n, m, 3) inertial positions in m of the deflected axis."""
     at_rest = np.zeros((len(places), 3))
     at_rest[:, 0] = places
@@ -224,11 +228,11 @@ def elastic_moment(motion: Motion, places: Array) -> Array:
 
 def elastic_force(motion: Motion, places: Array) -> Array:
     """(n, m) axial force EA s' in N of the axial shapes; SceneError for a beam without them."""
-    at = values_at(motion.shapes, places)
-    if not at.stretch.any():
+    values = values_at(motion.shapes, places)
+    if not values.stretch.any():
         raise SceneError(
             f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
             'use source = "equilibrium"'
         )
-    stretch = np.einsum("mk,tk->tm", at.stretch, motion.eta)
+    stretch = np.einsum("mk,tk->tm", values.stretch, motion.eta)
     return np.asarray(stretch * motion.shapes.sections(places).EA)

@@ -11,25 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 #: Shapes of a strip, and the colour map of their times: dark to bright, readable in grey.
-SHAPES, _COLOURS = 12, "viridis"
+MAX_SHAPES, _COLOUR_MAP = 12, "viridis"
 
 #: The bright end of the map is too pale on white.
-_BRIGHTEST = 0.88
+_MAX_BRIGHTNESS = 0.88
 
-_REST: dict[str, Any] = {
+_REST_STYLE: dict[str, Any] = {
     "color": "#9a9a9a",
     "linewidth": 0.9,
     "linestyle": (0, (4, 3)),
     "zorder": 1,
 }
 
-_RIGID: dict[str, Any] = {"color": "#b9b9b9", "linewidths": 1.4, "zorder": 2}
+_RIGID_STYLE: dict[str, Any] = {"color": "#b9b9b9", "linewidths": 1.4, "zorder": 2}
 
 #: An inertial direction is named if a picture's axis lies along it up to this.
-_ALONG = 1 - 1e-6
+_MIN_ALIGNMENT = 1 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -42,69 +42,77 @@ class Strip:
     at_rest: Array
 
 
-def instants(t: Array, count: int = SHAPES) -> NDArray[np.int64]:
+def shape_samples(t: Array, count: int = MAX_SHAPES) -> NDArray[np.int64]:
     """Indices of `count` samples spread evenly over the time, first and last among them."""
-    wanted = np.linspace(t[0], t[-1], max(2, count))
-    right = np.clip(np.searchsorted(t, wanted), 1, max(1, len(t) - 1))
+    targets = np.linspace(t[0], t[-1], max(2, count))
+    right = np.clip(np.searchsorted(t, targets), 1, max(1, len(t) - 1))
     left = right - 1
     right = np.minimum(right, len(t) - 1)
-    nearer = np.where(wanted - t[left] < t[right] - wanted, left, right)
-    nearer[0], nearer[-1] = 0, len(t) - 1
-    return np.unique(nearer)
+    nearest = np.where(targets - t[left] < t[right] - targets, left, right)
+    nearest[0], nearest[-1] = 0, len(t) - 1
+    return np.unique(nearest)
 
 
-def plane(points: Array) -> tuple[Array, Array]:
+def principal_plane(points: Array) -> tuple[Array, Array]:
     """Two unit vectors (3,) that span the plane in which points (..., 3) spread most.
 
     A coordinate plane where the points lie close to one, so that a planar scene is drawn as it was
     written; else the principal plane.  Points that are not finite do not count.
     """
-    cloud = _finite(points.reshape(-1, 3))
+    cloud = _finite_points(points.reshape(-1, 3))
     if not len(cloud):
         return np.eye(3)[0], np.eye(3)[1]
     cloud = cloud - cloud.mean(axis=0)
     spread = np.sqrt(np.mean(cloud**2, axis=0))
-    across = int(np.argmin(spread[::-1]))  # of equal ones the last: y up, z towards the reader
-    across = 2 - across
-    if spread[across] <= _FLAT * np.sort(spread)[1] or np.sort(spread)[1] <= 1e-9 * spread.max():
-        first, second = (np.eye(3)[k] for k in range(3) if k != across)
+    normal_index = int(
+        np.argmin(spread[::-1])
+    )  # of equal ones the last: y up, z towards the reader
+    normal_index = 2 - normal_index
+    if (
+        spread[normal_index] <= _MAX_FLATNESS * np.sort(spread)[1]
+        or np.sort(spread)[1] <= 1e-9 * spread.max()
+    ):
+        first, second = (np.eye(3)[k] for k in range(3) if k != normal_index)
         return first, second
     rows = np.linalg.svd(cloud, full_matrices=False)[2]
-    return rows[0] * _sign(rows[0]), rows[1] * _sign(rows[1])
+    return rows[0] * _dominant_sign(rows[0]), rows[1] * _dominant_sign(rows[1])
 
 
 #: Points count as lying in a plane if their spread across it is this part of that within.
-_FLAT = 0.3
+_MAX_FLATNESS = 0.3
 
 
-def _sign(v: Array) -> float:
+def _dominant_sign(v: Array) -> float:
     return 1.0 if v[int(np.argmax(np.abs(v)))] > 0 else -1.0
 
 
-def direction(v: Array) -> str:
+def direction_label(v: Array) -> str:
     """x, y or z for a unit vector along that axis; else its components."""
     k = int(np.argmax(np.abs(v)))
-    if v[k] > _ALONG:
+    if v[k] > _MIN_ALIGNMENT:
         return "xyz"[k]
     return "along (" + ", ".join(f"{c:.2f}" for c in v) + ")"
 
 
-def _finite(points: Array) -> Array:
+def _finite_points(points: Array) -> Array:
     """Those of the points (n, 3) that are numbers: samples may be beyond the model."""
     return points[np.isfinite(points).all(axis=1)]
 
 
 def strip_height(strips: list[Strip]) -> float:
     """Height in inches of a panel of the usual width in which these shapes fill the axes."""
-    cloud = _finite(np.concatenate([s.deflected.reshape(-1, 3) for s in strips]))
+    cloud = _finite_points(np.concatenate([s.deflected.reshape(-1, 3) for s in strips]))
     if not len(cloud):
-        return _LOWEST + _LABELS
-    first, second = (float(np.ptp(cloud @ axis)) for axis in plane(cloud))
-    return float(np.clip(_WIDTH * second / max(first, 1e-300), _LOWEST, _HIGHEST)) + _LABELS
+        return _MIN_HEIGHT + _LABEL_HEIGHT
+    first, second = (float(np.ptp(cloud @ axis)) for axis in principal_plane(cloud))
+    return (
+        float(np.clip(_AXES_WIDTH * second / max(first, 1e-300), _MIN_HEIGHT, _MAX_HEIGHT))
+        + _LABEL_HEIGHT
+    )
 
 
 #: Inches: axes of a strip, least and most height of its axes, room for its labels.
-_WIDTH, _LOWEST, _HIGHEST, _LABELS = 5.6, 1.2, 4.6, 0.6
+_AXES_WIDTH, _MIN_HEIGHT, _MAX_HEIGHT, _LABEL_HEIGHT = 5.6, 1.2, 4.6, 0.6
 
 
 def draw_strip(
@@ -116,14 +124,14 @@ def draw_strip(
     """
     from matplotlib.collections import LineCollection
 
-    everything = np.concatenate([s.deflected.reshape(-1, 3) for s in strips])
-    first, second = plane(everything)
+    points = np.concatenate([s.deflected.reshape(-1, 3) for s in strips])
+    first, second = principal_plane(points)
     basis = np.stack([first, second], axis=1)
-    colours, norm = _scale(np.concatenate([s.times for s in strips]))
+    colours, norm = _time_colours(np.concatenate([s.times for s in strips]))
     for lines in rigid:
-        axis.add_collection(LineCollection(list(lines @ basis), **_RIGID))
+        axis.add_collection(LineCollection(list(lines @ basis), **_RIGID_STYLE))
     for strip in strips:
-        axis.add_collection(LineCollection(list(strip.at_rest @ basis), **_REST))
+        axis.add_collection(LineCollection(list(strip.at_rest @ basis), **_REST_STYLE))
         shade = colours(norm(strip.times))
         axis.add_collection(
             LineCollection(
@@ -136,9 +144,9 @@ def draw_strip(
         axis.plot(*(place @ basis), marker="s", color="#000000", markersize=4.5, zorder=5)
     axis.autoscale_view()
     axis.set_aspect("equal", adjustable="datalim")
-    axis.set_xlabel(f"{direction(first)} in m")
-    axis.set_ylabel(f"{direction(second)} in m")
-    _bar(figure, axis, colours, norm)
+    axis.set_xlabel(f"{direction_label(first)} in m")
+    axis.set_ylabel(f"{direction_label(second)} in m")
+    _draw_colour_bar(figure, axis, colours, norm)
 
 
 def draw_deflections(
@@ -147,55 +155,55 @@ def draw_deflections(
     """Deflection (k, m) in m along a beam at k times, against the straight axis of its frame."""
     from matplotlib.collections import LineCollection
 
-    colours, norm = _scale(times)
-    axis.axhline(0.0, **_REST)
+    colours, norm = _time_colours(times)
+    axis.axhline(0.0, **_REST_STYLE)
     curves = [np.stack([x, row], axis=1) for row in across]
     axis.add_collection(LineCollection(curves, colors=colours(norm(times)), linewidths=1.6))
     axis.autoscale_view()
     axis.margins(x=0.01)
     axis.set_xlabel("place along the beam in m")
     axis.set_ylabel(f"{name} in m")
-    _bar(figure, axis, colours, norm)
+    _draw_colour_bar(figure, axis, colours, norm)
 
 
-def _scale(times: Array) -> tuple[Any, Any]:
+def _time_colours(times: Array) -> tuple[Any, Any]:
     """Colour map of the times, and what takes times to it."""
     import matplotlib as mpl
 
-    whole = mpl.colormaps[_COLOURS]
-    colours = mpl.colors.ListedColormap(whole(np.linspace(0, _BRIGHTEST, 256)))
+    colour_map = mpl.colormaps[_COLOUR_MAP]
+    colours = mpl.colors.ListedColormap(colour_map(np.linspace(0, _MAX_BRIGHTNESS, 256)))
     first, last = float(times.min()), float(times.max())
     return colours, mpl.colors.Normalize(first, last if last > first else first + 1)
 
 
-def _bar(figure: Any, axis: Any, colours: Any, norm: Any) -> None:
+def _draw_colour_bar(figure: Any, axis: Any, colours: Any, norm: Any) -> None:
     import matplotlib as mpl
 
-    shown = mpl.cm.ScalarMappable(norm, colours)
-    bar = figure.colorbar(shown, ax=axis, pad=0.02, fraction=0.05, aspect=25)
+    mappable = mpl.cm.ScalarMappable(norm, colours)
+    bar = figure.colorbar(mappable, ax=axis, pad=0.02, fraction=0.05, aspect=25)
     bar.outline.set_visible(False)
     bar.set_label("time in s")
 
 
 def draw_energies(axis: Any, t: Array, energies: Array, modes: tuple[str, ...], name: str) -> None:
     """Shares (n, modes) in J of the modes over time, one upon the other, the largest below."""
-    order = np.argsort(-energies.max(axis=0, initial=0.0), kind="stable")[:_MODES]
-    rest = np.setdiff1d(np.arange(len(modes)), order)
+    order = np.argsort(-energies.max(axis=0, initial=0.0), kind="stable")[:_MAX_LAYERS]
+    other_modes = np.setdiff1d(np.arange(len(modes)), order)
     layers = [energies[:, k] for k in order]
     names = [modes[k] for k in order]
-    if len(rest):
-        layers.append(energies[:, rest].sum(axis=1))
-        names.append(f"{len(rest)} more")
-    axis.stackplot(t, *layers, labels=names, colors=_LAYERS, linewidth=0)
+    if len(other_modes):
+        layers.append(energies[:, other_modes].sum(axis=1))
+        names.append(f"{len(other_modes)} more")
+    axis.stackplot(t, *layers, labels=names, colors=_LAYER_COLOURS, linewidth=0)
     axis.margins(x=0.01)
     axis.set_ylim(bottom=0.0)
     axis.set_ylabel(f"modal energy\nof {name} in J")
-    handles, words = axis.get_legend_handles_labels()
+    handles, texts = axis.get_legend_handles_labels()
     axis.legend(
-        handles[::-1], words[::-1], loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.2
+        handles[::-1], texts[::-1], loc="upper left", bbox_to_anchor=(1.0, 1.0), handlelength=1.2
     )
 
 
 #: Modes with a layer of their own.
-_MODES = 6
-_LAYERS = ("#0072B2", "#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#bdbdbd")
+_MAX_LAYERS = 6
+_LAYER_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#bdbdbd")

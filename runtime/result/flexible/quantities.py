@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from . import energy as observe_energy
+from . import modal_energy as observe_energy
 from . import motion as observe
-from .bodies import FlexibleBodies
-from .loads import section_loads
+from .body_motions import FlexibleBodies
 from .momentum import Momenta
+from .section_loads import section_loads
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ...engine.compiled import Compiled
-    from ..observed import Observed
+    from ...engine.compiled_scene import CompiledScene
+    from ..observations import Observations
     from .motion import Motion
 
 
@@ -37,8 +37,8 @@ class FlexibleResults:
     beam, a body that is not there, and a body that has no such quantity.
     """
 
-    model: Compiled
-    _observed: Observed
+    model: CompiledScene
+    _observed: Observations
 
     @cached_property
     def _flexible(self) -> FlexibleBodies:
@@ -54,7 +54,7 @@ class FlexibleResults:
         motion = self._flexible.motion(body, what)
         if isinstance(x, str):
             x = self._end(motion, x, what)
-        places = observe.stations(motion.body, x, what)
+        places = observe.checked_stations(motion.body, x, what)
         values = get(motion, places)
         return values[:, 0] if np.ndim(x) == 0 else values
 
@@ -99,7 +99,7 @@ class FlexibleResults:
         From "equilibrium": inertia, gravity and loads of the free side added up.  From "shapes":
         -EI_y w'' and EI_z v'', which cannot be better than the shapes' curvature.
         """
-        if _source(source) == "equilibrium":
+        if _require_source(source) == "equilibrium":
             return self.section_moment(body, x)[..., 1:]
         return self._along(body, x, "bending_moment", observe.elastic_moment)
 
@@ -109,7 +109,7 @@ class FlexibleResults:
         From "equilibrium" as `section_force`, also where the axis does not stretch; from "shapes"
         EA s', of beams with axial modes.
         """
-        if _source(source) == "equilibrium":
+        if _require_source(source) == "equilibrium":
             return self.section_force(body, x)[..., 0]
         return self._along(body, x, "axial_force", observe.elastic_force)
 
@@ -132,7 +132,7 @@ class FlexibleResults:
             raise SceneError(f"shape: points = {points}: expected 2 or more")
         motion = self._flexible.motion(body, "shape")
         length = observe.shapes_of(motion.body, "shape").length
-        return observe.shape(motion, np.linspace(0.0, length, points))
+        return observe.deflected_axis(motion, np.linspace(0.0, length, points))
 
     # --- of a flexible body ---------------------------------------------------------------------
 
@@ -169,7 +169,7 @@ class FlexibleResults:
         return self._momenta.of(body).spin
 
 
-def _source(source: str) -> str:
+def _require_source(source: str) -> str:
     if source not in SOURCES:
         raise SceneError(f'source = "{source}": expected "equilibrium" or "shapes"')
     return source

@@ -8,129 +8,167 @@ from typing import TYPE_CHECKING
 
 from mstmm.risk import Risk
 
-from .estimators import BENDING_ENERGY
+from .range_estimators import BENDING_ENERGY
 
 if TYPE_CHECKING:
-    from .certify import Flexibility
+    from .model_range import ModelRange
 
 #: From where on there is one: slope, load ratio of a linear beam and spin in first frequencies,
 #: bending energy that the shapes miss, shear, rotation of a section (rad), buckling, strain.
-SLOPE, GAMMA, SPIN, TAIL, SHEAR, TURN, BUCKLING, STRAIN = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05
+(
+    MAX_SLOPE,
+    MAX_LOAD_RATIO,
+    MAX_SPIN_RATIO,
+    MAX_MISSED_SHARE,
+    MAX_SHEAR_ERROR,
+    MAX_ROTATION,
+    MIN_BUCKLING_RATIO,
+    MAX_STRAIN,
+) = 0.3, 0.1, 1.0, 0.1, 0.05, 1.4, -0.9, 0.05
 
 
-def risks(found: Sequence[Flexibility]) -> list[Risk]:
+def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
     """Objections to flexible models, one finding per kind, for its worst body."""
     rows = []
-    for one in found:
-        for text in one.said:
+    for body_range in found:
+        for text in body_range.said:
             means, _, remedy = text.partition("; ")
-            rows.append(Risk("body-model", f'"{one.name}"', means, remedy))
-    worst_first = sorted(found, key=lambda one: -max(one.slope, one.spin_ratio, one.load_ratio))
-    for kind in (_linear, _steep, _turned, _strained, _missed, _buckled, _aside, _sheared):
-        seen = [risk for one in worst_first if (risk := kind(one)) is not None]
-        if seen:
-            more = f" (and {len(seen) - 1} more bodies likewise)" if len(seen) > 1 else ""
-            rows.append(replace(seen[0], means=seen[0].means + more))
+            rows.append(Risk("body-model", f'"{body_range.name}"', means, remedy))
+    worst_first = sorted(
+        found,
+        key=lambda body_range: -max(body_range.slope, body_range.spin_ratio, body_range.load_ratio),
+    )
+    for kind in (
+        _stiffening_risk,
+        _slope_risk,
+        _rotation_risk,
+        _strain_risk,
+        _shape_risk,
+        _buckling_risk,
+        _lateral_buckling_risk,
+        _shear_risk,
+    ):
+        kind_risks = [risk for body_range in worst_first if (risk := kind(body_range)) is not None]
+        if kind_risks:
+            more = (
+                f" (and {len(kind_risks) - 1} more bodies likewise)" if len(kind_risks) > 1 else ""
+            )
+            rows.append(replace(kind_risks[0], means=kind_risks[0].means + more))
     return rows
 
 
-def _linear(one: Flexibility) -> Risk | None:
+def _stiffening_risk(one: ModelRange) -> Risk | None:
     if one.stiffening:
         return None
-    stiffens = 'use flexibility = "coupled"' if one.one_way else "leave stiffening on"
-    lacks = "responds one way, without stiffening" if one.one_way else "has no geometric stiffening"
-    if one.spin_ratio > SPIN:
-        way_out = stiffens if one.gamma or one.one_way else "model it by beams, or from a mesh"
+    stiffening_remedy = 'use flexibility = "coupled"' if one.one_way else "leave stiffening on"
+    limitation = (
+        "responds one way, without stiffening" if one.one_way else "has no geometric stiffening"
+    )
+    if one.spin_ratio > MAX_SPIN_RATIO:
+        remedy = (
+            stiffening_remedy if one.gamma or one.one_way else "model it by beams, or from a mesh"
+        )
         return Risk(
             "stiffening", f'"{one.name}"',
-            f'"{one.name}" {lacks} and spins at {one.spin_ratio:.2g} times its '
+            f'"{one.name}" {limitation} and spins at {one.spin_ratio:.2g} times its '
             "first frequency: its deflection grows without bound where a real body stiffens",
-            way_out, one.spin_ratio, SPIN,
+            remedy, one.spin_ratio, MAX_SPIN_RATIO,
         )  # fmt: skip
-    if one.load_ratio > GAMMA:
+    if one.load_ratio > MAX_LOAD_RATIO:
         return Risk(
             "stiffening", f'"{one.name}"',
-            f'"{one.name}" {lacks}, but its loads change its stiffness by '
+            f'"{one.name}" {limitation}, but its loads change its stiffness by '
             f"{one.load_ratio:.0%} (gamma): deflections err by about as much",
-            stiffens, one.load_ratio, GAMMA,
+            stiffening_remedy, one.load_ratio, MAX_LOAD_RATIO,
         )  # fmt: skip
     return None
 
 
-def _steep(one: Flexibility) -> Risk | None:
-    if one.slope <= SLOPE:
+def _slope_risk(one: ModelRange) -> Risk | None:
+    if one.slope <= MAX_SLOPE:
         return None
     return Risk(
-        "slope", f'"{one.name}"',
+        "slope",
+        f'"{one.name}"',
         f'"{one.name}" bends by a slope of {one.slope:.2g} against its floating frame; beyond '
-        f"{SLOPE:g} one frame is too little (error up to {one.frame_error:.0%} of the deflection, "
+        f"{MAX_SLOPE:g} one frame is too little (error up to {one.frame_error:.0%} of the "
+        f"deflection, "
         f"{min(one.shortening_error, 9.99):.0%} of the shortening)",
-        "split the body into welded parts", one.slope, SLOPE,
-    )  # fmt: skip
+        "split the body into welded parts",
+        one.slope,
+        MAX_SLOPE,
+    )
 
 
-def _strained(one: Flexibility) -> Risk | None:
-    if one.strain is None or one.strain <= STRAIN:
+def _strain_risk(one: ModelRange) -> Risk | None:
+    if one.strain is None or one.strain <= MAX_STRAIN:
         return None
     return Risk(
         "strain", f'"{one.name}"',
-        f'"{one.name}" is strained by {one.strain:.2g}; beyond {STRAIN:g} the model, which is '
-        "linear in the strain, has no meaning", "check stiffness and loads", one.strain, STRAIN,
+        f'"{one.name}" is strained by {one.strain:.2g}; beyond {MAX_STRAIN:g} the model, which is '
+        "linear in the strain, has no meaning", "check stiffness and loads", one.strain, MAX_STRAIN,
     )  # fmt: skip
 
 
-def _turned(one: Flexibility) -> Risk | None:
-    if one.turn <= TURN:
+def _rotation_risk(one: ModelRange) -> Risk | None:
+    if one.turn <= MAX_ROTATION:
         return None
     return Risk(
-        "turn", f'"{one.name}"',
+        "turn",
+        f'"{one.name}"',
         f'a section of "{one.name}" turns by {one.turn:.2g} rad against its floating frame; the '
-        "model has no meaning beyond 1.5 rad", "split the body into welded parts", one.turn, TURN,
+        "model has no meaning beyond 1.5 rad",
+        "split the body into welded parts",
+        one.turn,
+        MAX_ROTATION,
         "rad",
-    )  # fmt: skip
+    )
 
 
-def _missed(one: Flexibility) -> Risk | None:
-    if one.tail is None or one.tail <= TAIL:
+def _shape_risk(one: ModelRange) -> Risk | None:
+    if one.tail is None or one.tail <= MAX_MISSED_SHARE:
         return None
-    beam = one.tail_of == BENDING_ENERGY
-    carries = 'basis = "static+fixed-interface"' if beam else "static_shapes at its ends"
+    is_beam = one.tail_of == BENDING_ENERGY
+    basis_remedy = 'basis = "static+fixed-interface"' if is_beam else "static_shapes at its ends"
     return Risk(
-        "shapes", f'"{one.name}"',
-        f'the shapes of "{one.name}" miss {one.tail:.0%} of {"its" if beam else "the"} '
+        "shapes",
+        f'"{one.name}"',
+        f'the shapes of "{one.name}" miss {one.tail:.0%} of {"its" if is_beam else "the"} '
         f"{one.tail_of}",
-        f"take more modes, or {carries}, which carries the loads of its hinges", one.tail, TAIL,
-    )  # fmt: skip
+        f"take more modes, or {basis_remedy}, which carries the loads of its hinges",
+        one.tail,
+        MAX_MISSED_SHARE,
+    )
 
 
-def _buckled(one: Flexibility) -> Risk | None:
-    if one.gamma is None or one.gamma[0] >= BUCKLING:
+def _buckling_risk(one: ModelRange) -> Risk | None:
+    if one.gamma is None or one.gamma[0] >= MIN_BUCKLING_RATIO:
         return None
     return Risk(
         "buckling", f'"{one.name}"',
         f'its loads take {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
         "its buckling load, by compression, or sideways by bending moments at work on its twist",
-        "make it stiffer, or its loads less", one.gamma[0], BUCKLING,
+        "make it stiffer, or its loads less", one.gamma[0], MIN_BUCKLING_RATIO,
     )  # fmt: skip
 
 
-def _aside(one: Flexibility) -> Risk | None:
-    if one.sideways is None or one.sideways < -BUCKLING:
+def _lateral_buckling_risk(one: ModelRange) -> Risk | None:
+    if one.sideways is None or one.sideways < -MIN_BUCKLING_RATIO:
         return None
     return Risk(
         "buckling", f'"{one.name}"',
         f'the loads of "{one.name}" reach {one.sideways:.0%} of those that buckle it out of the '
         "plane of its shapes, which does not show", "give it shapes of y, z and twist",
-        one.sideways, -BUCKLING,
+        one.sideways, -MIN_BUCKLING_RATIO,
     )  # fmt: skip
 
 
-def _sheared(one: Flexibility) -> Risk | None:
-    if one.shear is None or one.shear <= SHEAR:
+def _shear_risk(one: ModelRange) -> Risk | None:
+    if one.shear is None or one.shear <= MAX_SHEAR_ERROR:
         return None
     return Risk(
         "shear", f'"{one.name}"',
         f'shapes by which "{one.name}" bends are too short for a beam without shear: their '
         f"frequencies err by about {min(one.shear, 1.0):.0%}, by the share that they have",
-        "take an elastic body", one.shear, SHEAR,
+        "take an elastic body", one.shear, MAX_SHEAR_ERROR,
     )  # fmt: skip

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 #: Points at which a load is known in each cell: a polynomial of degree 5.
-POINTS = 6
+POINTS_PER_CELL = 6
 #: Eigenvectors further from being a basis than this belong to critically damped oscillators.
-_CRITICAL = 1e7
+_MAX_CONDITION = 1e7
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Cells:
             np.linspace(a, b, n, endpoint=False)
             for a, b, n in zip(times[:-1], times[1:], counts, strict=True)
         ]
-        places = np.cumsum(counts)[:-1]
-        return cls(np.concatenate([*parts, times[-1:]]), frozenset(places.tolist()))
+        break_positions = np.cumsum(counts)[:-1]
+        return cls(np.concatenate([*parts, times[-1:]]), frozenset(break_positions.tolist()))
 
     @property
     def lengths(self) -> Array:
@@ -52,26 +52,26 @@ class Cells:
     @property
     def samples(self) -> Array:
         """(m * POINTS,) times at which the loads are wanted, inside the cells (Gauss points)."""
-        at = (np.polynomial.legendre.leggauss(POINTS)[0] + 1) / 2
-        return np.asarray((self.edges[:-1, None] + self.lengths[:, None] * at).reshape(-1))
+        nodes = (np.polynomial.legendre.leggauss(POINTS_PER_CELL)[0] + 1) / 2
+        return np.asarray((self.edges[:-1, None] + self.lengths[:, None] * nodes).reshape(-1))
 
     def polynomials(self, values: Array) -> Array:
         """(m, POINTS, n) coefficients of (s / length)^j from values (m * POINTS, n)."""
-        at = (np.polynomial.legendre.leggauss(POINTS)[0] + 1) / 2
-        inverse = np.linalg.inv(np.vander(at, increasing=True))
-        by_cell = values.reshape(len(self.lengths), POINTS, -1)
+        nodes = (np.polynomial.legendre.leggauss(POINTS_PER_CELL)[0] + 1) / 2
+        inverse = np.linalg.inv(np.vander(nodes, increasing=True))
+        by_cell = values.reshape(len(self.lengths), POINTS_PER_CELL, -1)
         return np.asarray(np.einsum("jp,cpn->cjn", inverse, by_cell))
 
     def jumps(self, coefficients: Array) -> Array:
         """(n,) largest step of the polynomials at edges where loads are smooth: their error."""
         before, after = coefficients.sum(axis=1)[:-1], coefficients[1:, 0]
-        smooth = [k - 1 for k in range(1, len(self.edges) - 1) if k not in self.breaks]
-        return np.asarray(np.max(np.abs(after - before)[smooth], axis=0, initial=0.0))
+        smooth_edges = [k - 1 for k in range(1, len(self.edges) - 1) if k not in self.breaks]
+        return np.asarray(np.max(np.abs(after - before)[smooth_edges], axis=0, initial=0.0))
 
     def find(self, times: Array) -> NDArray[np.int64]:
         """The cell of each time; an edge belongs to the cell behind it, the last to the last."""
-        found = np.searchsorted(self.edges, times, side="right") - 1
-        return np.clip(found, 0, len(self.lengths) - 1)
+        indices = np.searchsorted(self.edges, times, side="right") - 1
+        return np.clip(indices, 0, len(self.lengths) - 1)
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Oscillators:
             matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(omega**2), -damping]])
             scale = np.concatenate([np.ones(n), omega])
             roots, vectors = np.linalg.eig(matrix * scale / scale[:, None])
-            if np.linalg.cond(vectors) < _CRITICAL:
+            if np.linalg.cond(vectors) < _MAX_CONDITION:
                 vectors = vectors * scale[:, None]
                 return roots, vectors, np.linalg.inv(vectors)
             damping = damping * (1 + 1e-9) + 1e-12 * np.diag(omega)
@@ -113,22 +113,26 @@ class Oscillators:
         shapes = self.modes[1]
         n = len(shapes)
         forcing = np.einsum("kj,cpi,ij->cpk", inverse[:, n:], loads, shapes)
-        back = shapes.T @ self.mass
-        state = inverse @ np.concatenate([back @ start[0], back @ start[1]])
+        projection = shapes.T @ self.mass
+        state = inverse @ np.concatenate([projection @ start[0], projection @ start[1]])
         starts = [state]
         growth, weights = _propagation(roots, cells.lengths, cells.lengths)
         for cell in range(len(cells.lengths)):
             state = growth[cell] * state + np.sum(weights[cell] * forcing[cell], axis=0)
             starts.append(state)
-        of = cells.find(times)
-        inside = times - cells.edges[of]
-        growth, weights = _propagation(roots, inside, cells.lengths[of])
-        states = growth * np.array(starts)[of] + np.sum(weights * forcing[of], axis=1)
-        shares = (inside / cells.lengths[of])[:, None] ** np.arange(POINTS)
-        now = np.einsum("tp,tpk->tk", shares, forcing[of])
-        rates = states * roots + now
-        found = np.stack([states @ vectors[:n].T, states @ vectors[n:].T, rates @ vectors[n:].T])
-        return np.asarray(found.real @ shapes.T)
+        cell_indices = cells.find(times)
+        offsets = times - cells.edges[cell_indices]
+        growth, weights = _propagation(roots, offsets, cells.lengths[cell_indices])
+        states = growth * np.array(starts)[cell_indices] + np.sum(
+            weights * forcing[cell_indices], axis=1
+        )
+        shares = (offsets / cells.lengths[cell_indices])[:, None] ** np.arange(POINTS_PER_CELL)
+        load_values = np.einsum("tp,tpk->tk", shares, forcing[cell_indices])
+        rates = states * roots + load_values
+        components = np.stack(
+            [states @ vectors[:n].T, states @ vectors[n:].T, rates @ vectors[n:].T]
+        )
+        return np.asarray(components.real @ shapes.T)
 
 
 def _propagation(roots: Any, lengths: Array, whole: Array) -> tuple[Any, Any]:
@@ -136,16 +140,16 @@ def _propagation(roots: Any, lengths: Array, whole: Array) -> tuple[Any, Any]:
     z = lengths[:, None] * roots
     growth = np.exp(z)
     share = (lengths / whole)[:, None]
-    large = np.abs(z) > 2.0
-    safe = np.where(large, z, 1.0)
-    recursive, series, found = (growth - 1) / safe, 0.0, []
-    for j in range(POINTS):
+    is_large = np.abs(z) > 2.0
+    safe_z = np.where(is_large, z, 1.0)
+    recursive, series, integrals = (growth - 1) / safe_z, 0.0, []
+    for j in range(POINTS_PER_CELL):
         if j:
-            recursive = (j * recursive - 1) / safe
+            recursive = (j * recursive - 1) / safe_z
         series, term = np.zeros_like(z), np.full_like(z, 1 / (j + 1))
         for k in range(30):
             series = series + term
-            term = term * np.where(large, 0.0, z) / (j + 2 + k)
-        integral = np.where(large, recursive, series)
-        found.append(integral * lengths[:, None] * share**j)
-    return growth, np.stack(found, axis=1)
+            term = term * np.where(is_large, 0.0, z) / (j + 2 + k)
+        integral = np.where(is_large, recursive, series)
+        integrals.append(integral * lengths[:, None] * share**j)
+    return growth, np.stack(integrals, axis=1)

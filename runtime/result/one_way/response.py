@@ -16,30 +16,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 from mstmm.risk import RUN, Risk
 
 from ...flexible.kernel_inputs import moments_of
 from ...flexible.modal_kernels import kernel
-from ...kernels.vectorized import evaluate
-from ...run.execution import Watch, first_run
-from ..observed import Observed
+from ...kernels.numpy_kernels import evaluate
+from ...run.run_execution import RunMonitor, first_run
+from ..observations import Observations
 from .oscillators import Cells, Oscillators
 
 if TYPE_CHECKING:
-    from ...engine.compiled import Compiled
+    from ...engine.compiled_scene import CompiledScene
     from ...flexible.modal_body import ModalBody
-    from ...pack.flexible.rigidified import Rigidified
+    from ...packing.flexible.rigid_substitution import RigidSubstitution
     from ...run.trajectory import Trajectory
 
 
 #: Steps of the loads' polynomials at smooth edges, of the largest load, that end the refinement.
-TOLERANCE = 1e-7
-FIRST_CELLS, MOST_CELLS = 32, 4096
+LOAD_TOLERANCE = 1e-7
+MIN_CELLS, MAX_CELLS = 32, 4096
 
 #: Two edges so near to each other, as part of the run, are one.
-_APART = 1e-9
+_MIN_EDGE_DISTANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Response:
 
 
 @dataclass(frozen=True)
-class Cost:
+class ResponseCost:
     """What a one-way run took besides the rigid run itself.
 
     evaluations: right-hand sides of the rigid runs from which loads were sampled; samples: states
@@ -75,136 +75,144 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class OneWay:
+class OneWayResponses:
     """Responses of the one-way bodies over a run, and what they cost."""
 
     responses: Mapping[str, Response]
-    cost: Cost
+    cost: ResponseCost
 
     @property
     def risks(self) -> tuple[Risk, ...]:
         """That the loads were too rough for their polynomials."""
-        if self.cost.error <= 10 * TOLERANCE:
+        if self.cost.error <= 10 * LOAD_TOLERANCE:
             return ()
         return (Risk(
             "one-way-loads", RUN,
             f"one-way response: the loads of the rigid run change too fast for {self.cost.cells} "
             f"cells (steps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
-            self.cost.error, 10 * TOLERANCE,
+            self.cost.error, 10 * LOAD_TOLERANCE,
         ),)  # fmt: skip
 
 
-def respond(model: Compiled, run: Trajectory) -> OneWay:
+def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
     """Responses of every one-way body at the samples of a run of the rigid bodies.
 
     The rigid run is repeated from its start with samples where the loads are wanted, twice as many
     each time until their polynomials join.  Raises NumericalFailure where it cannot be repeated.
     """
-    rigid = rigidity(model)
+    rigid = rigidified_bodies(model)
     total = sum(body.n for body in rigid.one_way.values())
-    times, cells, spent = _times(model, run), FIRST_CELLS, 0
-    if times[-1] == times[0]:
-        return OneWay(_at_start(model, run), Cost(0, 0, 0, total, 0.0))
+    break_times, cells, evaluations = _break_times(model, run), MIN_CELLS, 0
+    if break_times[-1] == break_times[0]:
+        return OneWayResponses(_start_responses(model, run), ResponseCost(0, 0, 0, total, 0.0))
     while True:
-        grid = Cells.between(times, cells)
-        sampled = _sampled(model, run, grid)
-        spent += sampled.statistics.evaluations
-        observed = Observed(model, sampled)
+        grid = Cells.between(break_times, cells)
+        load_run = _rerun_at_samples(model, run, grid)
+        evaluations += load_run.statistics.evaluations
+        observed = Observations(model, load_run)
         loads = {
-            name: grid.polynomials(_finite(modal_loads(model, body, observed), name, observed))
+            name: grid.polynomials(
+                _require_finite(modal_loads(model, body, observed), name, observed)
+            )
             for name, body in rigid.one_way.items()
         }
-        error = max((_error(rigid.one_way[n], grid, p) for n, p in loads.items()), default=0.0)
-        if error <= TOLERANCE or 2 * cells > MOST_CELLS:
+        error = max(
+            (_relative_jump(rigid.one_way[n], grid, p) for n, p in loads.items()), default=0.0
+        )
+        if error <= LOAD_TOLERANCE or 2 * cells > MAX_CELLS:
             break
         cells *= 2
     responses = {
-        name: _response(model, body, grid, loads[name], run.t)
+        name: _body_response(model, body, grid, loads[name], run.t)
         for name, body in rigid.one_way.items()
     }
     count = len(grid.lengths)
-    return OneWay(responses, Cost(spent, len(grid.samples), count, total, error))
+    return OneWayResponses(
+        responses, ResponseCost(evaluations, len(grid.samples), count, total, error)
+    )
 
 
-def rigidity(model: Compiled) -> Rigidified:
+def rigidified_bodies(model: CompiledScene) -> RigidSubstitution:
     """What became of the bodies that are rigid in a model's runs."""
     expanded = model.packed.expanded
     assert expanded is not None and expanded.rigidified is not None
     return expanded.rigidified
 
 
-def _times(model: Compiled, run: Trajectory) -> Array:
+def _break_times(model: CompiledScene, run: Trajectory) -> Array:
     """Times of the start and the last sample, and those between at which loads may jump
     or become narrow."""
     first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
-    known = model.packed.time_map(first, last)
-    between = [t for t in (*known.breaks, *known.starts, *events) if first < t < last]
-    times = np.unique([first, *between, last])
-    apart = np.diff(times) > _APART * (last - first)  # a time may lie between two breaks
-    return np.append(times[:-1][apart], last)
+    time_map = model.packed.time_map(first, last)
+    inner_times = [t for t in (*time_map.breaks, *time_map.starts, *events) if first < t < last]
+    times = np.unique([first, *inner_times, last])
+    is_distinct = np.diff(times) > _MIN_EDGE_DISTANCE * (
+        last - first
+    )  # a time may lie between two breaks
+    return np.append(times[:-1][is_distinct], last)
 
 
-def _sampled(model: Compiled, run: Trajectory, grid: Cells) -> Trajectory:
+def _rerun_at_samples(model: CompiledScene, run: Trajectory, grid: Cells) -> Trajectory:
     s, (t, q, u) = run.settings, run.first
     times = tuple(grid.samples.tolist())
     settings = replace(s, t_start=t, t_end=times[-1], output_times=times, first_step=0.0)
-    repeated = first_run(model, settings, q, u, Watch(None, settings))
+    repeated = first_run(model, settings, q, u, RunMonitor(None, settings))
     if not repeated.is_comparable or repeated.t[-1] < times[-1]:
         raise NumericalFailure(
             f"one-way response: the run could not be repeated: {repeated.message}"
         )
-    return _without_events(repeated, grid)
+    return _drop_event_rows(repeated, grid)
 
 
-def _without_events(run: Trajectory, grid: Cells) -> Trajectory:
+def _drop_event_rows(run: Trajectory, grid: Cells) -> Trajectory:
     """A run's rows at the times asked for alone."""
     rows = np.searchsorted(run.t, grid.samples)
     keys = ("t", "q", "u", "memory", "work", "event")
     return replace(run, **{key: getattr(run, key)[rows] for key in keys})
 
 
-def _error(body: ModalBody, grid: Cells, loads: Array) -> float:
+def _relative_jump(body: ModalBody, grid: Cells, loads: Array) -> float:
     """Largest step at smooth edges, of the largest load, both as static deflections."""
     largest = np.max(np.abs(loads[:, 0]), axis=0, initial=0.0)
     stiffness = np.diag(body.K)
-    whole = float(np.max(largest / stiffness, initial=0.0))
-    return float(np.max(grid.jumps(loads) / stiffness)) / whole if whole > 0 else 0.0
+    scale = float(np.max(largest / stiffness, initial=0.0))
+    return float(np.max(grid.jumps(loads) / stiffness)) / scale if scale > 0 else 0.0
 
 
-def modal_loads(model: Compiled, body: ModalBody, observed: Observed) -> Array:
+def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -> Array:
     """(n, modes) in N: what acts on the shapes of a body that moves rigidly, less its inertia."""
-    rigid, packed = rigidity(model), observed.engine.packed
+    rigid, packed = rigidified_bodies(model), observed.engine.packed
     points = observed.points(body.name)
-    turned = points[:, 15:24].reshape(-1, 3, 3)
+    rotation = points[:, 15:24].reshape(-1, 3, 3)
 
     def inward(vectors: Array) -> Array:
-        return np.asarray(np.einsum("tji,tj->ti", turned, vectors))
+        return np.asarray(np.einsum("tji,tj->ti", rotation, vectors))
 
     spin, spin_rate = inward(points[:, 9:12]), inward(points[:, 12:15])
-    carried = inward(points[:, 6:9] - np.array(model.scene.gravity))
-    still = np.zeros((len(points), body.n))
-    given = {
-        **moments_of(body), "K": body.K, "D": body.D, "eta": still, "etad": still,
-        "motion": np.concatenate([spin, spin_rate, carried], axis=1),
+    acceleration = inward(points[:, 6:9] - np.array(model.scene.gravity))
+    zero = np.zeros((len(points), body.n))
+    inputs = {
+        **moments_of(body), "K": body.K, "D": body.D, "eta": zero, "etad": zero,
+        "motion": np.concatenate([spin, spin_rate, acceleration], axis=1),
     }  # fmt: skip
-    loads = -evaluate(kernel("residual"), given, body.n)["e_f"]
-    held = rigid.held[body.name]
-    holder = rigid.holders.get(body.name)
-    acting = [] if holder is None else [(held, holder.name, 1.0)]
+    loads = -evaluate(kernel("residual"), inputs, body.n)["e_f"]
+    inboard_end = rigid.held[body.name]
+    inboard_hinge = rigid.holders.get(body.name)
+    hinge_loads = [] if inboard_hinge is None else [(inboard_end, inboard_hinge.name, 1.0)]
     welds = [node for node in rigid.nodes.values() if split_node(node)[0] == body.name]
-    acting += [(split_node(node)[1], node, -1.0) for node in welds]
-    for end, hinge, sign in acting:
+    hinge_loads += [(split_node(node)[1], node, -1.0) for node in welds]
+    for end, hinge, sign in hinge_loads:
         load = sign * observed.columns("loads", (packed.hinge_position[hinge],))
         port = body.ports[end]
         loads = loads + inward(load[:, :3]) @ port.phi + inward(load[:, 3:]) @ port.theta
     return np.asarray(loads)
 
 
-def _finite(loads: Array, name: str, observed: Observed) -> Array:
+def _require_finite(loads: Array, name: str, observed: Observations) -> Array:
     if not np.isfinite(loads).all():
-        why = next(iter(observed.failures), "they are beyond what numbers hold")
-        raise NumericalFailure(f'one-way response: no loads on the shapes of "{name}": {why}')
+        reason = next(iter(observed.failures), "they are beyond what numbers hold")
+        raise NumericalFailure(f'one-way response: no loads on the shapes of "{name}": {reason}')
     return loads
 
 
@@ -214,33 +222,33 @@ def split_node(node: str) -> tuple[str, str]:
     return body, end
 
 
-def _response(
-    model: Compiled, body: ModalBody, grid: Cells, loads: Array, times: Array
+def _body_response(
+    model: CompiledScene, body: ModalBody, grid: Cells, loads: Array, times: Array
 ) -> Response:
     oscillators = Oscillators(body.K, body.D, body.Mff)
-    return Response(*oscillators.motion(grid, loads, _start(model, body, loads[0, 0]), times))
+    return Response(*oscillators.motion(grid, loads, _modal_start(model, body, loads[0, 0]), times))
 
 
-def _start(model: Compiled, body: ModalBody, load: Array) -> tuple[Array, Array]:
+def _modal_start(model: CompiledScene, body: ModalBody, load: Array) -> tuple[Array, Array]:
     """(eta, etad) at the beginning of a run, under modal loads (modes,) in N there."""
     if _starts_static(model, body.name):
         return np.asarray(np.linalg.solve(body.K, load)), np.zeros(body.n)
     return body.eta, body.etad
 
 
-def _starts_static(model: Compiled, name: str) -> bool:
+def _starts_static(model: CompiledScene, name: str) -> bool:
     scene = model.scene
     return any(b.initial.static for b in (*scene.beam, *scene.elastic) if b.name == name)
 
 
-def _at_start(model: Compiled, run: Trajectory) -> dict[str, Response]:
+def _start_responses(model: CompiledScene, run: Trajectory) -> dict[str, Response]:
     """Responses of a run whose samples, if there are any, all stand at its beginning."""
-    found, observed = {}, Observed(model, run)
-    for name, body in rigidity(model).one_way.items():
+    responses, observed = {}, Observations(model, run)
+    for name, body in rigidified_bodies(model).one_way.items():
         loads = modal_loads(model, body, observed)
-        rows = [(*_start(model, body, load), load) for load in loads]
+        rows = [(*_modal_start(model, body, load), load) for load in loads]
         states = np.array(rows).reshape(len(rows), 3, body.n)
         eta, etad = states[:, 0], states[:, 1]
         forces = states[:, 2] - eta @ body.K.T - etad @ body.D.T
-        found[name] = Response(eta, etad, np.asarray(np.linalg.solve(body.Mff, forces.T).T))
-    return found
+        responses[name] = Response(eta, etad, np.asarray(np.linalg.solve(body.Mff, forces.T).T))
+    return responses

@@ -7,23 +7,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.risk import Risk
 
-from ...engine.compiled import Compiled
-from ...pack.flexible.rigidified import with_level
-from ...pack.letting_go import releasable
-from ...run.start import initial_state
-from ..blows import is_struck
-from ..flexible.bodies import FlexibleBodies
-from ..flexible.coupling import couplings
+from ...engine.compiled_scene import CompiledScene
+from ...packing.flexible.rigid_substitution import with_level
+from ...packing.hinge_release import releasable
+from ...run.start_state import initial_state
+from ..flexible.body_motions import FlexibleBodies
+from ..flexible.modal_participation import participation_by_body
 from ..flexible.motion import Motion
-from ..observed import Observed
+from ..impacts import has_impacts
+from ..observations import Observations
 from ..quantities import Quantities
 from ..result import Result
-from .motion import Superposition
-from .response import Cost, OneWay, Response, respond, rigidity
+from .elastic_superposition import Superposition
+from .response import OneWayResponses, Response, ResponseCost, compute_responses, rigidified_bodies
 
 if TYPE_CHECKING:
     from ...run.error_estimate import ErrorEstimate
@@ -32,24 +32,24 @@ if TYPE_CHECKING:
 
 #: Share of the inertia at a hinge above which a one-way response errs by about 0.3 of itself:
 #: 3 chi / (1 - chi), the factor for recoil and phase.
-COUPLED = 0.09
+MAX_UNCOUPLED_SHARE = 0.09
 
 
-def _too_coupled(share: tuple[str, float]) -> Risk:
+def _coupling_risk(share: tuple[str, float]) -> Risk:
     name, chi = share
     return Risk(
         "one-way-coupling", f'"{name}"',
         f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
         "the inertia there (chi), so that the one-way response may err by "
         f"{3 * chi / (1 - chi):.1f} of its deflection", 'use flexibility = "coupled"', chi,
-        COUPLED,
+        MAX_UNCOUPLED_SHARE,
     )  # fmt: skip
 
 
-def _let_go(model: Compiled) -> tuple[Risk, ...]:
+def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
     """Each one-way body whose hinge releases it."""
-    letting, rigid = set(releasable(model.scene)), rigidity(model)
-    holders = {body: h.name for body, h in rigid.holders.items() if h.name in letting}
+    releasing_hinges, rigid = set(releasable(model.scene)), rigidified_bodies(model)
+    holders = {body: h.name for body, h in rigid.holders.items() if h.name in releasing_hinges}
     return tuple(
         Risk(
             "one-way-release", f'"{name}"',
@@ -61,7 +61,7 @@ def _let_go(model: Compiled) -> tuple[Risk, ...]:
     )  # fmt: skip
 
 
-def _not_struck(name: str) -> Risk:
+def _impact_risk(name: str) -> Risk:
     return Risk(
         "one-way-blow", f'"{name}"',
         f'the run has blows, of which the response of "{name}" knows nothing: it follows the loads '
@@ -78,10 +78,10 @@ class OneWayResult(Result):
     """
 
     def __init__(
-        self, model: Compiled, run: Trajectory, error: ErrorEstimate | None = None
+        self, model: CompiledScene, run: Trajectory, error: ErrorEstimate | None = None
     ) -> None:
         super().__init__(model, run, error)
-        self._observed = _Superposed(self, self._observed)
+        self._observed = _SuperposedObservations(self, self._observed)
         self._quantities = Quantities(self._observed, self)
 
     @cached_property
@@ -90,44 +90,48 @@ class OneWayResult(Result):
         return Result(self.model, self.trajectory, self._error)
 
     @cached_property
-    def _one_way(self) -> OneWay:
-        return respond(self.model, self.trajectory)
+    def _one_way(self) -> OneWayResponses:
+        return compute_responses(self.model, self.trajectory)
 
     @property
-    def cost(self) -> Cost:
+    def cost(self) -> ResponseCost:
         """What the elastic response took besides the rigid run.  Printable."""
         return self._one_way.cost
 
     def response(self, body: str) -> Response:
         """Modal coordinates of a one-way body with their rates; SceneError for other names."""
-        found = self._one_way.responses
-        if body not in found:
-            raise SceneError(f'"{body}": expected a body that responds one way: {", ".join(found)}')
-        return found[body]
+        responses = self._one_way.responses
+        if body not in responses:
+            raise SceneError(
+                f'"{body}": expected a body that responds one way: {", ".join(responses)}'
+            )
+        return responses[body]
 
     def _outside(self) -> tuple[Risk, ...]:
         """As of any result, and where the response is not to be trusted."""
-        found = (*super()._outside(), *self._one_way.risks, *_let_go(self.model))
-        if is_struck(self):
-            found = (*found, *map(_not_struck, rigidity(self.model).one_way))
-        return (*found, *map(_too_coupled, self.couplings.items()))
+        risks = (*super()._outside(), *self._one_way.risks, *_release_risks(self.model))
+        if has_impacts(self):
+            risks = (*risks, *map(_impact_risk, rigidified_bodies(self.model).one_way))
+        return (*risks, *map(_coupling_risk, self.couplings.items()))
 
     @cached_property
     def couplings(self) -> dict[str, float]:
         """Bodies whose vibration moves the hinge that carries them by more than COUPLED, with the
         largest share chi of the inertia there that one of their shapes holds."""
-        found = {name: float(np.max(chi)) for name, chi in couplings(self._flexible).items()}
-        return {name: chi for name, chi in found.items() if chi > COUPLED}
+        largest_shares = {
+            name: float(np.max(chi)) for name, chi in participation_by_body(self._flexible).items()
+        }
+        return {name: chi for name, chi in largest_shares.items() if chi > MAX_UNCOUPLED_SHARE}
 
     @cached_property
     def _flexible(self) -> FlexibleBodies:
         return _OneWayBodies(self)
 
 
-class _Superposed(Observed):
+class _SuperposedObservations(Observations):
     """What a run shows, with elastic motions on top of the rigid ones."""
 
-    def __init__(self, result: OneWayResult, rigid: Observed) -> None:
+    def __init__(self, result: OneWayResult, rigid: Observations) -> None:
         super().__init__(result.model, result.trajectory)
         self._result, self._rigid = result, rigid
         self._moved: dict[str, Array] = {}
@@ -139,9 +143,9 @@ class _Superposed(Observed):
     def points(self, reference: str) -> Array:
         """(n, 24): motion of "body" or "body.end", see `Observation`."""
         if reference not in self._moved:
-            moved = self._superposition.moved(reference)
-            moved.flags.writeable = False
-            self._moved[reference] = moved
+            motion = self._superposition.moved(reference)
+            motion.flags.writeable = False
+            self._moved[reference] = motion
         return self._moved[reference]
 
 
@@ -151,15 +155,15 @@ class _OneWayBodies(FlexibleBodies):
     def __init__(self, result: OneWayResult) -> None:
         super().__init__(result.model, result._observed)
         self._result = result
-        rigid = rigidity(result.model)
+        rigid = rigidified_bodies(result.model)
         self._responding, self.unbalanced = rigid.one_way, rigid.passed
         self.known = {**self.known, **self._responding}
         self.one_way = self._responding
 
-    def coupled_start(self) -> tuple[Compiled, Array]:
+    def coupled_start(self) -> tuple[CompiledScene, Array]:
         """A model in which all of them are coupled, and its q at the start of the run."""
         model = self.model
-        coupled = Compiled(with_level(model.scene, "coupled"), model.known)
+        coupled = CompiledScene(with_level(model.scene, "coupled"), model.known)
         q, _ = initial_state(coupled)
         start = self.run.first[1]
         q[: len(start)] = start
@@ -170,9 +174,9 @@ class _OneWayBodies(FlexibleBodies):
         if name not in self._responding:
             return super().motion(name, what)
         if name not in self._motions:
-            found, points = self._result.response(name), self.observed.points(name)
+            response, points = self._result.response(name), self.observed.points(name)
             self._motions[name] = Motion(
-                self._responding[name], self.run.t, found.eta, found.etad, found.etadd,
+                self._responding[name], self.run.t, response.eta, response.etad, response.etadd,
                 points[:, 0:3], points[:, 15:24].reshape(-1, 3, 3), points[:, 3:6],
                 points[:, 9:12], points[:, 6:9], points[:, 12:15],
             )  # fmt: skip

@@ -7,23 +7,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mstmm.arguments import word_of
-from mstmm.arrays import Array
+from mstmm.argument_validation import require_word
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ...engine.shown import rate_unit
-from ..names import Quantity, columns
-from .choice import Chosen, choose
-from .curves import curve
-from .shown import Shown
+from ...engine.observation_columns import rate_unit
+from ..quantity_names import Quantity, column_labels
+from .curve_interpolation import curve
+from .default_quantities import DefaultPanel, choose_panels
+from .plot_sources import PlotSource
 from .spectra import spectrum
-from .titles import noun, with_unit
+from .titles import common_noun, with_unit
 
 #: What is drawn: over time or another quantity, the rate over the quantity, or over frequency.
-KINDS = ("time", "phase", "spectrum")
+PLOT_KINDS = ("time", "phase", "spectrum")
 
 #: A panel shows at least this part of its largest value.
-_FLAT = 1e-3
+_MIN_SPAN_RATIO = 1e-3
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class PlotSelection:
     """What to draw: names, none for a choice; over which other quantity; a kind of KINDS."""
 
     names: tuple[str, ...] = ()
@@ -78,78 +78,85 @@ class Wanted:
                     f'plot: expected the name of a quantity, such as "energy", found {name!r:.60}; '
                     "of several names each is an argument of its own"
                 )
-        known = f"one of {', '.join(KINDS)}"
-        if word_of("kind", self.kind, known) not in KINDS:
-            raise SceneError(f"kind = {self.kind!r}: expected {known}")
+        expected = f"one of {', '.join(PLOT_KINDS)}"
+        if require_word("kind", self.kind, expected) not in PLOT_KINDS:
+            raise SceneError(f"kind = {self.kind!r}: expected {expected}")
         if self.against is not None and self.kind != "time":
             raise SceneError(
                 f'against = "{self.against}" beside kind = "{self.kind}": take one of them'
             )
 
 
-def panels(runs: Mapping[str, Shown], wanted: Wanted) -> list[Panel]:
+def build_panels(runs: Mapping[str, PlotSource], wanted: PlotSelection) -> list[Panel]:
     """One for each unit, in the order of the names; curves of all runs, by their labels.
 
     SceneError for a name that no run has, and for what cannot be drawn of a quantity.
     """
     first = next(iter(runs.values()))
-    groups = _named(runs, wanted.names) if wanted.names else choose(first)
-    return [_panel(runs, group, wanted) for group in groups]
+    groups = _named_panels(runs, wanted.names) if wanted.names else choose_panels(first)
+    return [_build_panel(runs, group, wanted) for group in groups]
 
 
-def _named(runs: Mapping[str, Shown], names: Sequence[str]) -> list[Chosen]:
+def _named_panels(runs: Mapping[str, PlotSource], names: Sequence[str]) -> list[DefaultPanel]:
     """The names by their units; of several names of one quantity the first."""
     units: dict[str, dict[str, str]] = {}
     for name in names:
-        found = _first(runs, name)
-        units.setdefault(found.unit, {}).setdefault(found.name, name)
-    return [Chosen(tuple(some.values()), unit) for unit, some in units.items()]
+        quantity = _first_quantity(runs, name)
+        units.setdefault(quantity.unit, {}).setdefault(quantity.name, name)
+    return [
+        DefaultPanel(tuple(names_by_quantity.values()), unit)
+        for unit, names_by_quantity in units.items()
+    ]
 
 
-def _first(runs: Mapping[str, Shown], name: str) -> Quantity:
+def _first_quantity(runs: Mapping[str, PlotSource], name: str) -> Quantity:
     """Of the first run that has it; what the first one says where none has."""
-    refused: SceneError | None = None
+    first_error: SceneError | None = None
     for run in runs.values():
         try:
             return run.quantity(name)
         except SceneError as error:
-            refused = refused or error
-    assert refused is not None
-    raise refused
+            first_error = first_error or error
+    assert first_error is not None
+    raise first_error
 
 
-def _panel(runs: Mapping[str, Shown], group: Chosen, wanted: Wanted) -> Panel:
-    quantities = [_first(runs, name) for name in group.names]
-    labels = [label for one in quantities for label in columns(one)]
-    alone = len(labels) == 1
-    traces, lacking = [], []
+def _build_panel(
+    runs: Mapping[str, PlotSource], group: DefaultPanel, wanted: PlotSelection
+) -> Panel:
+    quantities = [_first_quantity(runs, name) for name in group.names]
+    labels = [label for one in quantities for label in column_labels(one)]
+    is_single = len(labels) == 1
+    traces, missing_notes = [], []
     for number, (run_label, run) in enumerate(runs.items()):
-        for name, place in zip(group.names, _places(quantities), strict=True):
+        for name, first_column in zip(group.names, _first_columns(quantities), strict=True):
             try:
                 quantity = run.quantity(name)
             except SceneError:
-                lacking.append(f"{run_label} has no {name}")
+                missing_notes.append(f"{run_label} has no {name}")
                 continue
-            for k, (x, y) in enumerate(_drawn(run, quantity, wanted)):
-                column = labels[place + k]
+            for k, (x, y) in enumerate(_drawn_curves(run, quantity, wanted)):
+                column = labels[first_column + k]
                 if len(runs) == 1:
-                    trace = Trace(column, x, y, number if alone else place + k)
-                elif alone:
+                    trace = Trace(column, x, y, number if is_single else first_column + k)
+                elif is_single:
                     trace = Trace(run_label, x, y, number)
                 else:
-                    whole = f"{column}, {run_label}"
-                    trace = Trace(whole, x, y, place + k, number, column=column, run=run_label)
+                    full_label = f"{column}, {run_label}"
+                    trace = Trace(
+                        full_label, x, y, first_column + k, number, column=column, run=run_label
+                    )
                 traces.append(trace)
-    more = "; ".join(filter(None, (group.more, *lacking)))
-    title, below, alike = _titles(quantities, runs, wanted)
-    notes = (group.sentence, *lacking, *(f"{x.name}: {x.note}" for x in quantities if x.note))
+    more = "; ".join(filter(None, (group.more, *missing_notes)))
+    title, x_label, has_equal_scales = _panel_titles(quantities, runs, wanted)
+    notes = (group.sentence, *missing_notes, *(f"{x.name}: {x.note}" for x in quantities if x.note))
     return Panel(
-        title, below, wanted.kind if wanted.against is None else "against", group.names,
-        tuple(traces), more, alike, tuple(dict.fromkeys(filter(None, notes))),
+        title, x_label, wanted.kind if wanted.against is None else "against", group.names,
+        tuple(traces), more, has_equal_scales, tuple(dict.fromkeys(filter(None, notes))),
     )  # fmt: skip
 
 
-def steady(panel: Panel) -> tuple[float, float] | None:
+def constant_axis_limits(panel: Panel) -> tuple[float, float] | None:
     """Where the axis of a panel of constants ends, which shows them as lines, not their last digits
     as mountains; None for all others."""
     values = np.concatenate([trace.y for trace in panel.traces])
@@ -157,36 +164,38 @@ def steady(panel: Panel) -> tuple[float, float] | None:
     if not len(values):
         return None
     low, high = float(values.min()), float(values.max())
-    least = _FLAT * max(abs(low), abs(high))
-    if high - low >= least:
+    min_span = _MIN_SPAN_RATIO * max(abs(low), abs(high))
+    if high - low >= min_span:
         return None
     middle = (low + high) / 2
-    return middle - least / 2, middle + least / 2
+    return middle - min_span / 2, middle + min_span / 2
 
 
-def _places(quantities: Sequence[Quantity]) -> list[int]:
+def _first_columns(quantities: Sequence[Quantity]) -> list[int]:
     """Number of the first column of each."""
-    counts = [len(columns(one)) for one in quantities]
+    counts = [len(column_labels(quantity)) for quantity in quantities]
     return [sum(counts[:k]) for k in range(len(counts))]
 
 
-def _titles(
-    quantities: Sequence[Quantity], runs: Mapping[str, Shown], wanted: Wanted
+def _panel_titles(
+    quantities: Sequence[Quantity], runs: Mapping[str, PlotSource], wanted: PlotSelection
 ) -> tuple[str, str, bool]:
     """Title, what lies along x, and whether both are lengths."""
-    what, unit = noun(quantities), quantities[0].unit
+    text, unit = common_noun(quantities), quantities[0].unit
     if wanted.against is not None:
-        other = _scalar(_first(runs, wanted.against))
-        below = with_unit(noun([other]), other.unit)
-        return with_unit(what, unit), below, unit == other.unit == "m"
+        abscissa = _require_scalar(_first_quantity(runs, wanted.against))
+        x_label = with_unit(common_noun([abscissa]), abscissa.unit)
+        return with_unit(text, unit), x_label, unit == abscissa.unit == "m"
     if wanted.kind == "phase":
-        return with_unit(f"rate of {what}", rate_unit(unit)), with_unit(what, unit), False
+        return with_unit(f"rate of {text}", rate_unit(unit)), with_unit(text, unit), False
     if wanted.kind == "spectrum":
-        return with_unit(f"amplitude of {what}", unit), "frequency (Hz)", False
-    return with_unit(what, unit), "time (s)", False
+        return with_unit(f"amplitude of {text}", unit), "frequency (Hz)", False
+    return with_unit(text, unit), "time (s)", False
 
 
-def _drawn(run: Shown, quantity: Quantity, wanted: Wanted) -> Iterator[tuple[Array, Array]]:
+def _drawn_curves(
+    run: PlotSource, quantity: Quantity, wanted: PlotSelection
+) -> Iterator[tuple[Array, Array]]:
     """x and y of every column."""
     if wanted.kind == "spectrum":
         frequencies, amplitudes = spectrum(run.t, quantity)
@@ -194,16 +203,16 @@ def _drawn(run: Shown, quantity: Quantity, wanted: Wanted) -> Iterator[tuple[Arr
         return
     t, values = curve(run.t, quantity)
     if wanted.kind == "phase":
-        _, rates = curve(run.t, _rate(quantity))
+        _, rates = curve(run.t, _rate_quantity(quantity))
         yield from zip(values.T, rates.T, strict=True)
         return
     if wanted.against is not None:
-        _, across = curve(run.t, _scalar(run.quantity(wanted.against)))
-        t = across[:, 0]
+        _, abscissa = curve(run.t, _require_scalar(run.quantity(wanted.against)))
+        t = abscissa[:, 0]
     yield from ((t, column) for column in values.T)
 
 
-def _rate(quantity: Quantity) -> Quantity:
+def _rate_quantity(quantity: Quantity) -> Quantity:
     """Its time derivative; SceneError where that is no quantity."""
     rates: Callable[[], Array] | None = quantity.rates
     if rates is None:
@@ -214,7 +223,7 @@ def _rate(quantity: Quantity) -> Quantity:
     return replace(quantity, values=np.asarray(rates()), rates=None)
 
 
-def _scalar(quantity: Quantity) -> Quantity:
+def _require_scalar(quantity: Quantity) -> Quantity:
     if quantity.labels:
         raise SceneError(
             f'against "{quantity.name}": it has {len(quantity.labels)} components; take one, such '

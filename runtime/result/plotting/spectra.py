@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ..names import Quantity
-from .curves import between
+from ..quantity_names import Quantity
+from .curve_interpolation import interpolate
 
 #: Samples that a spectrum needs, and that one is made of at most.
-_LEAST, _MOST = 16, 2**16
+_MIN_SAMPLES, _MAX_SAMPLES = 16, 2**16
 
 #: Frequencies lie this much closer than one over the run, so that a peak is found between them.
-_CLOSER = 4
+_FREQUENCY_REFINEMENT = 4
 
 
 def spectrum(t: Array, quantity: Quantity) -> tuple[Array, Array]:
@@ -29,23 +29,31 @@ def spectrum(t: Array, quantity: Quantity) -> tuple[Array, Array]:
     """
     from scipy.signal import periodogram
 
-    t, some = np.unique(t, return_index=True)
-    values = quantity.values.reshape(len(quantity.values), -1)[some]
-    if len(t) < _LEAST:
+    t, unique_indices = np.unique(t, return_index=True)
+    values = quantity.values.reshape(len(quantity.values), -1)[unique_indices]
+    if len(t) < _MIN_SAMPLES:
         raise SceneError(
-            f'"{quantity.name}": a spectrum needs {_LEAST} samples or more, there are {len(t)}; '
+            f'"{quantity.name}": a spectrum needs {_MIN_SAMPLES} samples or more, there are '
+            f"{len(t)}; "
             "ask for more output times"
         )
     if not np.isfinite(values).all():
         raise SceneError(f'"{quantity.name}": some values are not finite, so it has no spectrum')
-    even = np.linspace(t[0], t[-1], min(len(t), _MOST))
-    if not np.allclose(t, even, rtol=0, atol=1e-6 * (even[1] - even[0])):
+    even_times = np.linspace(t[0], t[-1], min(len(t), _MAX_SAMPLES))
+    if not np.allclose(t, even_times, rtol=0, atol=1e-6 * (even_times[1] - even_times[0])):
         rates = (
             None if quantity.rates is None else quantity.rates().reshape(len(quantity.values), -1)
         )
-        values = between(t, values, None if rates is None else rates[some], even)
+        values = interpolate(
+            t, values, None if rates is None else rates[unique_indices], even_times
+        )
     frequencies, powers = periodogram(
-        values, 1 / (even[1] - even[0]), "hann", _CLOSER * len(even), "constant",
-        scaling="spectrum", axis=0,
-    )  # fmt: skip
+        values,
+        1 / (even_times[1] - even_times[0]),
+        "hann",
+        _FREQUENCY_REFINEMENT * len(even_times),
+        "constant",
+        scaling="spectrum",
+        axis=0,
+    )
     return frequencies, np.sqrt(2 * powers)

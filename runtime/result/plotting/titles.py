@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..names import Quantity
+from ..quantity_names import Quantity
 
 #: Of quantities that have a unit in common and no more.
-_NOUNS = {
+_NOUN_BY_UNIT = {
     "rad": "angles", "m": "lengths", "rad/s": "angular velocities", "m/s": "velocities",
     "rad/s2": "angular accelerations", "m/s2": "accelerations", "N": "forces", "N*m": "moments",
     "J": "energies", "W": "powers", "kg*m/s": "momenta", "kg*m2/s": "angular momenta",
@@ -23,38 +23,38 @@ _UNIT_TEXT = {
 }
 
 #: Owners that are named one by one.
-_NAMED = 3
+_MAX_NAMED_OWNERS = 3
 
 
 def with_unit(text: str, unit: str) -> str:
     """angle of hinge elbow (rad)."""
-    shown = _UNIT_TEXT.get(unit, unit)
-    return f"{text} ({shown})" if shown else text
+    unit_text = _UNIT_TEXT.get(unit, unit)
+    return f"{text} ({unit_text})" if unit_text else text
 
 
-def noun(quantities: Sequence[Quantity]) -> str:
+def common_noun(quantities: Sequence[Quantity]) -> str:
     """What some quantities of one unit are: "angle of hinge elbow", "angle of hinges a, b",
     "lengths"."""
     first = quantities[0]
     if len(quantities) == 1:
         return first.long_name if first.owner or not first.what else first.what
-    owners = list(dict.fromkeys(one.owner for one in quantities))
-    if len({one.what or one.long_name for one in quantities}) == 1 and first.what:
-        return f"{first.what} of {_joined(owners)}" if first.owner else first.what
-    told = list(dict.fromkeys(one.what or one.name for one in quantities))
-    if not any(owners) and len(told) <= _NAMED:
-        return ", ".join(told)
-    text = _NOUNS.get(first.unit, "quantities")
+    owners = list(dict.fromkeys(quantity.owner for quantity in quantities))
+    if len({quantity.what or quantity.long_name for quantity in quantities}) == 1 and first.what:
+        return f"{first.what} of {_join_owners(owners)}" if first.owner else first.what
+    descriptions = list(dict.fromkeys(quantity.what or quantity.name for quantity in quantities))
+    if not any(owners) and len(descriptions) <= _MAX_NAMED_OWNERS:
+        return ", ".join(descriptions)
+    text = _NOUN_BY_UNIT.get(first.unit, "quantities")
     return f"{text} of {owners[0]}" if len(owners) == 1 and owners[0] else text
 
 
-def _joined(owners: list[str]) -> str:
+def _join_owners(owners: list[str]) -> str:
     """hinges elbow, wrist; rod1, rod2; 7 hinges."""
     words = {owner.partition(" ")[0] if " " in owner else "" for owner in owners}
     word = words.pop() if len(words) == 1 else ""
     if len(owners) == 1:
         return owners[0]
-    if len(owners) > _NAMED:
+    if len(owners) > _MAX_NAMED_OWNERS:
         return f"{len(owners)} {word}s" if word else f"{len(owners)} bodies and ends"
     names = [owner.removeprefix(f"{word} ") if word else owner for owner in owners]
     return f"{word}s {', '.join(names)}" if word else ", ".join(names)

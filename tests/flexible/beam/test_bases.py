@@ -10,9 +10,9 @@ from flexible.beam_scenes import FREE, HELD, PIN, body_of
 from flexible.linear import frequencies, held, joined
 
 from mstmm.errors import SceneError
-from mstmm.runtime.flexible.beam.frame import Frame
-from mstmm.runtime.flexible.beam.frames import in_frame
-from mstmm.runtime.flexible.beam.shapes import Piecewise
+from mstmm.runtime.flexible.beam.frame_conditions import in_frame
+from mstmm.runtime.flexible.beam.frame_location import Frame
+from mstmm.runtime.flexible.beam.shape_functions import Piecewise
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 PIECES = [(0.0, 0.3, 1.0, 1.0), (0.3, 0.8, 4.0, 0.25), (0.8, 1.1, 0.5, 2.0)]  # from, to, EI, m

@@ -10,7 +10,7 @@ import scipy.linalg
 from flexible.beam_scenes import FREE, HELD, PIN, body_of
 
 import mstmm
-from mstmm.runtime.flexible.bodies import modal_bodies
+from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 from mstmm.scene import Scene
 
 ROD = {"name": "r", "mass": 1.0, "inertia": [0.01, 0.05, 0.05]}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.flexible.bodies import modal_bodies
+from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 
 HELD = {"name": "foot", "type": "fixed", "inboard": "ground", "outboard": "b"}
 

@@ -11,9 +11,9 @@ from flexible.beam_scenes import HELD, PIN, body_of
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.definiteness import is_definite_at, stays_definite
+from mstmm.runtime.flexible.mass_definiteness import is_definite_at, stays_definite
 from mstmm.runtime.flexible.modal_body import ModalBody
-from mstmm.runtime.flexible.support import ANY, Supports
+from mstmm.runtime.flexible.support_motion import ANY, Supports
 
 Array = NDArray[np.float64]
 

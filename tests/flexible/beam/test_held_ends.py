@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 import mstmm
 from mstmm.runtime.flexible.beam.restraint import Edge, blocks
-from mstmm.runtime.flexible.bodies import modal_bodies
+from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 
 WEIGHT, BENDING = 9.81, 10.0
 

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.beam import kernels
+from mstmm.runtime.flexible.beam import beam_kernels
 from mstmm.runtime.flexible.beam.multilinear import known, terms
 from mstmm.runtime.flexible.modal_body import ModalBody
 
@@ -57,9 +57,11 @@ def peak(work: Callable[[], object]) -> int:
 @pytest.mark.parametrize("kernel", GROUPS)
 def test_a_kernel_of_pairs_is_the_sum_of_its_terms(kernel: str, rng: np.random.Generator) -> None:
     groups = GROUPS[kernel]
-    given = {k: rng.normal(size=(kernels.rows(kernel, k), 5)) for group in groups for k in group}
+    given = {
+        k: rng.normal(size=(beam_kernels.rows(kernel, k), 5)) for group in groups for k in group
+    }
     whole = [np.concatenate([given[name] for name in group]) for group in groups]
-    for name, values in kernels.evaluate(kernel, given).items():
+    for name, values in beam_kernels.evaluate(kernel, given).items():
         for index, of_entry in terms(kernel, *groups)[name].items():
             total = sum((known(term, *whole) for term in of_entry), np.zeros(5))
             np.testing.assert_allclose(values[index], total, rtol=1e-13, atol=1e-13)
@@ -69,13 +71,13 @@ def test_no_kernel_is_evaluated_for_pairs(monkeypatch: pytest.MonkeyPatch) -> No
     """Points along the beam go with the shapes, so that evaluations for each shape go with their
     square; for each pair they would go with the cube."""
     evaluated: list[int] = []
-    evaluate = kernels.evaluate
+    evaluate = beam_kernels.evaluate
 
     def counted(name: str, inputs: Mapping[str, Array]) -> dict[str, Array]:
         evaluated.append(max(array.size for array in inputs.values()))
         return evaluate(name, inputs)
 
-    monkeypatch.setattr(kernels, "evaluate", counted)
+    monkeypatch.setattr(beam_kernels, "evaluate", counted)
     body(modes={"y": 2})  # the terms of the kernels
     totals = []
     for count in (15, 30, 60):

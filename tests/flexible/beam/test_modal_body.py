@@ -241,7 +241,7 @@ def test_frequencies_of_the_welded_frame_by_basis(
     basis: str, n: int, errors: tuple[float, ...]
 ) -> None:
     """Two welded beams, the first pinned: only a basis that carries the weld's moment converges."""
-    from mstmm.runtime.flexible.bodies import modal_bodies
+    from mstmm.runtime.flexible.flexible_bodies import modal_bodies
     from mstmm.scene import Scene
 
     beam = {"mass_per_length": 1.0, "bending_stiffness": 50.0, "modes": {"y": n}, "basis": basis,

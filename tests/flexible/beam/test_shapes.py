@@ -9,8 +9,8 @@ import mpmath
 import numpy as np
 import pytest
 
-from mstmm.runtime.flexible.beam.gauss import gauss_between
-from mstmm.runtime.flexible.beam.shapes import Eigenfunction, Piecewise, Shape, Sine, root
+from mstmm.runtime.flexible.beam.gauss_quadrature import gauss_between
+from mstmm.runtime.flexible.beam.shape_functions import Eigenfunction, Piecewise, Shape, Sine, root
 
 BENDING = ("clamped-free", "free-free", "clamped-clamped")
 

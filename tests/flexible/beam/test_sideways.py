@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.pack.internal import expansion_of
-from mstmm.runtime.result.flexible.certify import flexibilities
-from mstmm.runtime.result.flexible.sideways import rule, sideways
+from mstmm.runtime.packing.system_builder import expansion_of
+from mstmm.runtime.result.flexible.lateral_buckling import lateral_load_ratio, quadrature_rule
+from mstmm.runtime.result.flexible.model_range import model_ranges
 
 Array = NDArray[np.float64]
 
@@ -36,10 +36,10 @@ def found(carried: str, size: float, of: Any, held: float = 0.0, line: float = L
     assert expanded is not None
     body = expanded.bodies["blade"]
     assert body.shapes is not None
-    x, weights = rule(body.shapes, held)
+    x, weights = quadrature_rule(body.shapes, held)
     force, moment = np.zeros((1, len(x), 3)), np.zeros((1, len(x), 3))
     {"N": force[..., 0], "M_z": moment[..., 2]}[carried][0] = size * of(LENGTH - x)
-    seen = sideways(body, x, weights, held, line, force, moment)
+    seen = lateral_load_ratio(body, x, weights, held, line, force, moment)
     assert seen is not None
     return seen
 
@@ -80,7 +80,7 @@ def test_half_and_twice_the_load_of_prandtl(modes: dict[str, int]) -> None:
         force = f"-{part * 4.0126 * ROOT / LENGTH**2}*(1 - cos(pi*t))/2"
         pushed = scene([0, force, 0], modes=modes, bending_stiffness=[SOFT, 3e4])
         run = mstmm.compile(pushed).simulate(1.0, rtol=1e-6)
-        one = flexibilities(run._flexible)[0]
+        one = model_ranges(run._flexible)[0]
         assert one.sideways == pytest.approx(part, rel=0.02)
         told.append([text for text in run.certificate.warnings if "out of the plane" in text])
     assert told[0] == [] and len(told[1]) == 1 and "20" in told[1][0]
@@ -88,4 +88,4 @@ def test_half_and_twice_the_load_of_prandtl(modes: dict[str, int]) -> None:
 
 def test_a_beam_with_all_shapes_needs_no_such_word() -> None:
     run = mstmm.compile(scene([0, -0.1, 0], modes={"y": 1, "z": 1, "twist": 1})).simulate(0.1)
-    assert flexibilities(run._flexible)[0].sideways is None
+    assert model_ranges(run._flexible)[0].sideways is None

@@ -12,9 +12,18 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from mstmm.derive.classical.discrete.energy import Equations, Motion, equations
-from mstmm.derive.classical.discrete.moments import ETA, Letters, planar, spatial
-from mstmm.derive.language.derivation import Equation, vector
+from mstmm.derive.classical.discrete.equations_of_motion import (
+    Equations,
+    Motion,
+    equations_of_motion,
+)
+from mstmm.derive.classical.discrete.mass_moments import (
+    ETA,
+    SymbolTable,
+    planar_moments,
+    spatial_moments,
+)
+from mstmm.derive.definition.derivation import Equation, vector
 
 Numbers = dict[sp.Basic, sp.Rational]
 
@@ -79,18 +88,18 @@ def _planar_rows(
     def over(f: sp.Expr) -> sp.Expr:
         return density * sp.integrate(sp.expand(f), (x, 0, length))
 
-    letters = Letters()
-    body = planar(2, letters, "beam")
+    letters = SymbolTable()
+    body = planar_moments(2, letters, "beam")
     given = {
         "m": [over(sp.Integer(1))], "S_0": [over(x), 0], "I_0": [over(x**2)],
         "s": [over(f) for f in shapes], "S_c": [over(x * f) for f in shapes],
         "M_f": [over(f * g) for f in shapes for g in shapes], ETA: motion[ETA],
     }  # fmt: skip
-    solved = equations(body.moments, motion_of(letters, 2, 2), sp.zeros(2, 1))
+    solved = equations_of_motion(body.moments, motion_of(letters, 2, 2), sp.zeros(2, 1))
     return numeric(solved.rows, letters, body.definitions, given | motion)
 
 
-def motion_of(letters: Letters, shifts: int, modes: int) -> Motion:
+def motion_of(letters: SymbolTable, shifts: int, modes: int) -> Motion:
     def three(name: str, size: int, before: int) -> sp.Matrix:
         behind = [0] * (3 - before - size)
         return sp.Matrix([*[0] * before, *letters.of(vector(name, size)), *behind])
@@ -104,7 +113,7 @@ def motion_of(letters: Letters, shifts: int, modes: int) -> Motion:
 
 def numeric(
     rows: sp.Matrix,
-    letters: Letters,
+    letters: SymbolTable,
     definitions: tuple[Equation, ...],
     given: dict[str, list[sp.Expr]],
 ) -> sp.Matrix:
@@ -138,8 +147,8 @@ def test_spatial_beam_is_its_particles(planes: str, numbers: random.Random) -> N
     shapes = [sp.Matrix.hstack(*(sizes[i, k] * along[k] for k in range(modes))) for i in range(3)]
     motion = {name: list(columns(numbers, 3)) for name in ("a", "w", "wd")}
     motion |= {name: list(columns(numbers, modes)) for name in (ETA, "etad", "etadd")}
-    letters = Letters()
-    body = spatial(modes, letters, "beam", planes)
+    letters = SymbolTable()
+    body = spatial_moments(modes, letters, "beam", planes)
     total = [(m, r, phi) for m, r, phi in zip(masses, places, shapes, strict=True)]
     rest = sum((m * (r.dot(r) * sp.eye(3) - r * r.T) for m, r, _ in total), sp.zeros(3))
     given = {
@@ -153,7 +162,7 @@ def test_spatial_beam_is_its_particles(planes: str, numbers: random.Random) -> N
             for j in range(modes)
         ],
     }  # fmt: skip
-    solved = equations(body.moments, motion_of(letters, 3, modes), sp.zeros(modes, 1))
+    solved = equations_of_motion(body.moments, motion_of(letters, 3, modes), sp.zeros(modes, 1))
     found = numeric(solved.rows, letters, body.definitions, given | motion)
     assert found == particle_rows(total, motion)
 
@@ -176,10 +185,10 @@ def particle_rows(
 
 def test_derivatives_of_the_rows_are_theirs() -> None:
     """Columns of mass matrix, rates and shape against SymPy's derivatives of the rows."""
-    letters = Letters()
-    body = planar(2, letters, "elastic")
+    letters = SymbolTable()
+    body = planar_moments(2, letters, "elastic")
     motion = motion_of(letters, 2, 2)
-    solved: Equations = equations(body.moments, motion, sp.zeros(2, 1))
+    solved: Equations = equations_of_motion(body.moments, motion, sp.zeros(2, 1))
     put = {e.left: e.right for e in body.definitions}
     entries = {
         entry: value

@@ -16,14 +16,14 @@ import pytest
 from support.discrete_bodies import DIGITS, Array, ParticleBody, cross, kernel_inputs
 from support.random_bodies import random_body
 
-from mstmm.derive.audit.evaluate import evaluate
 from mstmm.derive.catalogue.kernels import built_in_kernels
 from mstmm.derive.classical.discrete import body as flexible_body
+from mstmm.derive.classical.discrete.body_options import BodyStatement
 from mstmm.derive.classical.discrete.state import PLANE, SPACE
-from mstmm.derive.classical.discrete.statement import BodyStatement
-from mstmm.derive.language.derivation import Quantity
-from mstmm.derive.language.notation import matrix_symbols
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.definition.derivation import Quantity
+from mstmm.derive.definition.notation import matrix_symbols
+from mstmm.derive.lower.kernel_lowering import lower
+from mstmm.derive.verification.kernel_evaluation import evaluate
 from mstmm.ir import KernelIR
 
 PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))

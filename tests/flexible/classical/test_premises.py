@@ -12,7 +12,7 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
-from bridge.mutations import mutants
+from pipeline.mutations import mutants
 from support.discrete_bodies import DIGITS, kernel_inputs
 from support.hinge_premises import body_residual, hinge_residual, matrices
 from support.premises import Premises
@@ -21,12 +21,12 @@ from support.random_bodies import random_body
 from mstmm.derive.catalogue.kernels import Kernel
 from mstmm.derive.classical.catalogue import CLASSICAL
 from mstmm.derive.classical.discrete import body as flexible_body
+from mstmm.derive.classical.discrete.body_options import BodyStatement
 from mstmm.derive.classical.discrete.catalogue import BODIES, HINGES, PLANAR_MODES, SPATIAL_MODES
-from mstmm.derive.classical.discrete.hinge import PAIRINGS, Pairing, pairing
+from mstmm.derive.classical.discrete.hinge import PAIRINGS, Pairing, named_pairing
 from mstmm.derive.classical.discrete.state import PLANE, SPACE
-from mstmm.derive.classical.discrete.statement import BodyStatement
-from mstmm.derive.language.derivation import Derivation
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.definition.derivation import Derivation
+from mstmm.derive.lower.kernel_lowering import lower
 
 #: The differences' own error is 1e-50.
 LIMIT = 1e-40
@@ -65,7 +65,9 @@ def test_determinant_is_one_at_any_motion(body: BodyStatement, rng: np.random.Ge
 
 def pair_of(name: str, which: str) -> Pairing:
     planar = HINGES[name][1]
-    return pairing(PLANE if planar else SPACE, which, PLANAR_MODES if planar else SPATIAL_MODES)
+    return named_pairing(
+        PLANE if planar else SPACE, which, PLANAR_MODES if planar else SPATIAL_MODES
+    )
 
 
 @pytest.mark.parametrize("which", PAIRINGS)

@@ -14,9 +14,9 @@ import pytest
 from numpy.typing import NDArray
 
 from mstmm.derive.classical.catalogue import CLASSICAL
-from mstmm.derive.lower.kernel import lower
+from mstmm.derive.lower.kernel_lowering import lower
 from mstmm.ir import KernelIR
-from mstmm.ir.replay import evaluate_floats
+from mstmm.ir.interpreter import evaluate_floats
 
 Array = NDArray[np.float64]
 Numbers = dict[str, Array]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.flexible.elastic.bodies import elastic_bodies
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 LENGTH, SIDE, YOUNG, DENSITY = 1.0, 0.02, 2e11, 7850.0

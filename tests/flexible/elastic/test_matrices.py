@@ -12,10 +12,10 @@ from flexible import elastic_bar as bar
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mstmm.runtime.flexible.elastic.bodies import elastic_bodies, save_matrices
+from mstmm.runtime.flexible.elastic.field_moments import moments
+from mstmm.runtime.flexible.elastic.finite_element_model import ElasticModel
 from mstmm.runtime.flexible.elastic.matrices import from_arrays
-from mstmm.runtime.flexible.elastic.model import ElasticModel
-from mstmm.runtime.flexible.elastic.moments import moments
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies, save_matrices
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from flexible import elastic_bar as bar
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.flexible.elastic import mesh
-from mstmm.runtime.flexible.elastic.bodies import elastic_bodies
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies
 
 meshio = pytest.importorskip("meshio", reason="comes with the extra test")
 skfem = pytest.importorskip("skfem", reason="comes with the extra test")
@@ -123,7 +123,7 @@ def test_ends_are_looked_at_before_anything_long(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_mesh_too_large_is_refused_unmade(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr("mstmm.runtime.flexible.elastic.bodies.box_mesh")
+    monkeypatch.delattr("mstmm.runtime.flexible.elastic.modal_elastic.box_mesh")
     fine = bar.table()["box"] | {"divisions": [384, 384, 384]}
     with pytest.raises(SceneError, match=r"6096 hexahedra of degree 2 or fewer, found 56623104"):
         bar.body(bar.table(box=fine))
@@ -135,7 +135,7 @@ def test_a_factorisation_too_long_is_refused_unbegun(monkeypatch: pytest.MonkeyP
     """A cube of as many cells as a plate needs far more."""
     for name in ("scipy.sparse.linalg.splu", "scipy.sparse.linalg.eigsh"):
         monkeypatch.delattr(name)
-    monkeypatch.setattr("mstmm.runtime.flexible.elastic.checks.MOST_WORK", 1e8)
+    monkeypatch.setattr("mstmm.runtime.flexible.elastic.matrix_checks.MOST_WORK", 1e8)
     cube = bar.table()["box"] | {"divisions": [4, 4, 4]}
     with pytest.raises(SceneError, match=r"2187 unknowns .* 1e\+08 multiplications .*, found 4"):
         bar.body(bar.table(box=cube))

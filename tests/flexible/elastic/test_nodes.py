@@ -11,9 +11,9 @@ from flexible import elastic_bar as bar
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.elastic.bodies import model_of
 from mstmm.runtime.flexible.elastic.craig_bampton import Release, reduce
-from mstmm.runtime.flexible.elastic.ports import port
+from mstmm.runtime.flexible.elastic.interface_nodes import port
+from mstmm.runtime.flexible.elastic.modal_elastic import model_of
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.cli.guard import run as command
+from mstmm.cli.error_boundary import run as command
 from mstmm.runtime.result.result import Result
 
 #: Spin-up to 6 rad/s, 1.58 times the first frequency (theory: Simo and Vu-Quoc 1986).

@@ -11,7 +11,11 @@ from support.beam_motions import LENGTH, MASS, beam, moving
 
 from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.runtime.result.flexible import motion as observe
-from mstmm.runtime.result.flexible.momentum import equivalent, frame_momentum, undeformed
+from mstmm.runtime.result.flexible.momentum import (
+    equivalent_momentum,
+    frame_momentum,
+    undeformed_inertia,
+)
 from mstmm.runtime.result.flexible.motion import Motion
 
 Array = NDArray[np.float64]
@@ -44,7 +48,7 @@ def particles(body: ModalBody, given: dict[str, Any]) -> tuple[Array, Array, Arr
             "position": np.asarray(given["position"]) + t * np.asarray(given["velocity"]),
             "eta": given["eta"] + t * given["etad"],
         }
-        return observe.shape(moving(body, **then), x)[0]
+        return observe.deflected_axis(moving(body, **then), x)[0]
 
     velocities = (8 * (places(STEP) - places(-STEP)) - places(2 * STEP) + places(-2 * STEP)) / (
         12 * STEP
@@ -62,7 +66,7 @@ def of_particles(body: ModalBody, given: dict[str, Any]) -> tuple[Array, Array, 
 
 def kernel_momentum(motion: Motion) -> Any:
     linear, about_origin, first = frame_momentum(motion)
-    return equivalent(motion, linear, about_origin, first / motion.body.mass)
+    return equivalent_momentum(motion, linear, about_origin, first / motion.body.mass)
 
 
 @pytest.mark.parametrize(
@@ -107,6 +111,9 @@ def test_undeformed_inertia_of_points_is_that_of_the_beam() -> None:
     table: dict[str, Any] = {"polar_inertia_per_length": 0.02}
     whole, points = (beam(**table, quadrature=on) for on in (False, True))
     assert points.points and not whole.points
-    (mass, inertia), (sum_of_masses, sum_of_inertias) = undeformed(whole), undeformed(points)
+    (mass, inertia), (sum_of_masses, sum_of_inertias) = (
+        undeformed_inertia(whole),
+        undeformed_inertia(points),
+    )
     assert sum_of_masses == pytest.approx(mass)
     np.testing.assert_allclose(sum_of_inertias, inertia, rtol=1e-9, atol=1e-12)

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.result.observed import Observed
+from mstmm.runtime.result.observations import Observations
 from mstmm.runtime.result.one_way.oscillators import Cells, Oscillators
-from mstmm.runtime.result.one_way.response import Response, modal_loads, rigidity
+from mstmm.runtime.result.one_way.response import Response, modal_loads, rigidified_bodies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
 Array = NDArray[np.float64]
@@ -238,8 +238,8 @@ def test_loads_are_in_balance() -> None:
     )  # fmt: skip
     found = mstmm.compile(tree, "looped", flexibility="one-way").simulate(0.5)
     assert isinstance(found, OneWayResult)
-    (body,) = rigidity(found.model).one_way.values()
-    observed = Observed(found.model, found.trajectory)
+    (body,) = rigidified_bodies(found.model).one_way.values()
+    observed = Observations(found.model, found.trajectory)
     left = modal_loads(found.model, rigid_shapes(body), observed)
     assert np.abs(found.force("root")).max() > 5
     assert np.abs(left).max() < 1e-9

@@ -11,7 +11,12 @@ from matplotlib.collections import LineCollection
 from matplotlib.image import imread
 
 import mstmm
-from mstmm.runtime.result.flexible.plot_shapes import Strip, instants, plane, strip_height
+from mstmm.runtime.result.flexible.plot_shapes import (
+    Strip,
+    principal_plane,
+    shape_samples,
+    strip_height,
+)
 from mstmm.runtime.result.result import Result
 
 
@@ -37,7 +42,7 @@ def lines_of(axis: Any, count: int) -> Any:
 def test_shapes_are_drawn_where_the_beam_was(run: Result) -> None:
     figure = run.plot("blade.shape")
     rest, bent = lines_of(figure.axes[0], 61)
-    at = instants(run.t)
+    at = shape_samples(run.t)
     assert len(at) == 12 and at[0] == 0 and at[-1] == 60
     np.testing.assert_allclose(bent, run.shape("blade", 61)[at][:, :, :2], atol=1e-14)
     np.testing.assert_allclose(rest[:, 0], run.position("blade")[at][:, :2], atol=1e-14)
@@ -48,7 +53,7 @@ def test_shapes_are_drawn_where_the_beam_was(run: Result) -> None:
 def test_all_bodies_in_one_picture_with_rigid_ones_and_the_ground(run: Result) -> None:
     axis = run.plot("shape").axes[0]
     (rigid,) = lines_of(axis, 2)
-    at = instants(run.t)
+    at = shape_samples(run.t)
     np.testing.assert_allclose(rigid[:, 1], run.position("arm.tip")[at][:, :2], atol=1e-14)
     assert len(axis.lines) == 1 and axis.lines[0].get_xdata()[0] == 0.0
 
@@ -65,7 +70,7 @@ def test_deflection_along_the_beam_and_energies(run: Result, tmp_path: Path) -> 
     figure = run.plot("blade.deflection", "blade.modal_energy", "pivot.angle", path=path)
     by_label = {axis.get_ylabel(): axis for axis in figure.axes}
     (curves,) = lines_of(by_label["deflection of blade\nalong y in m"], 61)
-    expected = run.deflection("blade", np.linspace(0, 1, 61))[instants(run.t)][:, :, 1]
+    expected = run.deflection("blade", np.linspace(0, 1, 61))[shape_samples(run.t)][:, :, 1]
     np.testing.assert_allclose(curves[:, :, 1], expected, atol=1e-15)
     energies = by_label["modal energy\nof blade in J"]
     top = max(c.get_paths()[0].vertices[:, 1].max() for c in energies.collections)
@@ -85,12 +90,15 @@ def test_pictures_have_names(run: Result) -> None:
 def test_the_plane_of_largest_motion() -> None:
     random = np.random.default_rng(1)
     flat = random.normal(size=(50, 3)) * [3.0, 0.1, 2.0]
-    first, second = plane(flat)
+    first, second = principal_plane(flat)
     assert first.tolist() == [1, 0, 0] and second.tolist() == [0, 0, 1]
-    assert [v.tolist() for v in plane(flat[:, [0, 2, 1]] * [1, 1, 0])] == [[1, 0, 0], [0, 1, 0]]
+    assert [v.tolist() for v in principal_plane(flat[:, [0, 2, 1]] * [1, 1, 0])] == [
+        [1, 0, 0],
+        [0, 1, 0],
+    ]
     turn, _ = np.linalg.qr(random.normal(size=(3, 3)))
     tilted = random.normal(size=(200, 3)) * [3.0, 2.0, 0.05] @ turn.T
-    for direction in plane(tilted):
+    for direction in principal_plane(tilted):
         assert abs(direction @ turn[:, 2]) < 0.05
 
 

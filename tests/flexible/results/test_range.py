@@ -10,7 +10,7 @@ from scipy.integrate import solve_bvp
 from support.models import model_of
 
 import mstmm
-from mstmm.runtime.result.flexible.estimators import shear_errors
+from mstmm.runtime.result.flexible.range_estimators import shear_errors
 from mstmm.runtime.result.result import Result
 
 ENDS = {"root": {"plane": [1, 0, 0, 0.0]}, "tip": {"plane": [1, 0, 0, 0.5]}}

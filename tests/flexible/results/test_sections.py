@@ -11,7 +11,7 @@ from support.beam_motions import EI_Y, EI_Z, LENGTH, MASS, beam, moving, under_t
 
 import mstmm
 from mstmm.runtime.result.flexible import motion as observe
-from mstmm.runtime.result.flexible.loads import LineLoad, PointLoad, section_loads
+from mstmm.runtime.result.flexible.section_loads import LineLoad, PointLoad, section_loads
 
 X = np.linspace(0.0, LENGTH, 7)
 STILL = np.zeros(3)
@@ -123,7 +123,7 @@ def test_shape_in_inertial_axes() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     bent = under_tip_load(body, np.array([0.0, 0.07, 0.0]))
     motion = replace(bent, rotation=turn[None], position=np.array([[1.0, 2.0, 3.0]]))
-    drawn = observe.shape(motion, X)[0]
+    drawn = observe.deflected_axis(motion, X)[0]
     deflected = observe.deflection(motion, X)[0]
     np.testing.assert_allclose(drawn[:, 0], 1.0 - deflected[:, 1], atol=1e-15)
     np.testing.assert_allclose(drawn[:, 1], 2.0 + X + deflected[:, 0], atol=1e-15)
@@ -136,7 +136,7 @@ def test_shape_in_inertial_axes() -> None:
 )  # fmt: skip
 def test_places_off_the_beam_are_refused(x: Any, words: str) -> None:
     with pytest.raises(mstmm.SceneError, match=words):
-        observe.stations(beam(), x, "deflection")
+        observe.checked_stations(beam(), x, "deflection")
 
 
 def test_rotations_of_sections_are_exact_at_any_angle() -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
 Complex = NDArray[np.complex128]

@@ -10,7 +10,7 @@ from linear.scenes import UNIT
 from scipy.linalg import eig
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
 #: Shaft of a disc at its tip: E I, length, mass, moments of inertia along and across the axis.

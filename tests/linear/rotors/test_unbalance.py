@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
 MASS, UNBALANCE = 8.0, 3e-4

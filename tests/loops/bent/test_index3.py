@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 
 from .test_against_tree import SCENES
 from .test_constraints import ROWS, bladed

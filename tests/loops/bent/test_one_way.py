@@ -12,11 +12,11 @@ from flexible.rigid_shapes import rigid_shapes
 from scipy.integrate import solve_ivp
 
 import mstmm
-from mstmm.arrays import Array
+from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.runtime.result.flexible.coupling import couplings
-from mstmm.runtime.result.observed import Observed
-from mstmm.runtime.result.one_way.response import modal_loads, rigidity
+from mstmm.runtime.result.flexible.modal_participation import participation_by_body
+from mstmm.runtime.result.observations import Observations
+from mstmm.runtime.result.one_way.response import modal_loads, rigidified_bodies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
 from .test_against_tree import ANGLE, CRANK, ROD, Scene, slider_crank
@@ -81,7 +81,7 @@ def test_a_rod_vibrates_by_its_own_equations(cut: str) -> None:
 @pytest.mark.parametrize("cut", CUTS)
 def test_the_end_turns_with_the_shapes_and_the_slider_does_not(cut: str) -> None:
     found = responding(linkage(cut, driven=True))
-    (body,) = rigidity(found.model).one_way.values()
+    (body,) = rigidified_bodies(found.model).one_way.values()
     expected = found.response("bar").eta @ body.ports["tip"].theta[2]
     np.testing.assert_allclose(turned(found, "bar.tip"), expected, atol=1e-9)
     assert np.abs(expected).max() > 1e-3
@@ -105,8 +105,8 @@ def test_loads_are_in_balance(cut: str) -> None:
         {"from": "ground", "to": "bar.root", "law": {"stiffness": 50.0, "rest": 0.1}}
     ]
     found = responding(scene)
-    (body,) = rigidity(found.model).one_way.values()
-    observed = Observed(found.model, found.trajectory)
+    (body,) = rigidified_bodies(found.model).one_way.values()
+    observed = Observations(found.model, found.trajectory)
     left = modal_loads(found.model, rigid_shapes(body), observed)
     assert np.abs(found.force("knee")).max() > 20
     assert np.abs(left).max() < 1e-8
@@ -149,7 +149,7 @@ def test_share_of_the_inertia_that_the_mechanism_shows(cut: str, heavy: float) -
     scene["hinge"][0]["initial"]["u"] = 0.0
     crank = scene["body"][0]
     crank["mass"], crank["inertia"] = heavy, [heavy * x for x in crank["inertia"]]
-    chi = float(couplings(responding(scene)._flexible)["bar"][0])
+    chi = float(participation_by_body(responding(scene)._flexible)["bar"][0])
     free = mstmm.compile(mstmm.Scene(**(scene | {"gravity": [0, 0, 0]})), "looped").modes(
         2, damped=False
     )
@@ -165,7 +165,7 @@ def test_what_hangs_on_the_rod_beside_the_loop_moves_along(tmp_path: Path) -> No
     scene["body"].append(bob)
     scene["hinge"].append({"name": "bolt", "type": "pin", "inboard": "bar.tip", "outboard": "bob"})
     found = responding(scene)
-    (body,) = rigidity(found.model).one_way.values()
+    (body,) = rigidified_bodies(found.model).one_way.values()
     turn = found.response("bar").eta @ body.ports["tip"].theta[2]
     np.testing.assert_allclose(turned(found, "bob"), turn, atol=1e-9)
     assert np.abs(turn).max() > 1e-3

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.engine.loops.calls import LoopCalls
-from mstmm.runtime.run.fastest import Fastest
+from mstmm.runtime.engine.loops.loop_calls import LoopCalls
+from mstmm.runtime.run.spectral_radius import FastestMode
 
 from ..linkages import four_bar, legs, rod
 from ..scenes import andrews
@@ -162,7 +162,7 @@ def test_fastest_motion() -> None:
     """What `auto` decides by is an eigenvalue of the accelerations' own derivatives."""
     model = mstmm.compile(mstmm.Scene(**bushed(1e8)))
     q, u = model.initial_state()
-    found = Fastest(model.looped, model.looped.start_memory()).rate(0.0, q, u)
+    found = FastestMode(model.looped, model.looped.start_memory()).rate(0.0, q, u)
     step, n = 1e-6, model.nu
     columns = [
         np.array([

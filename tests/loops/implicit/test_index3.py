@@ -10,7 +10,7 @@ import pytest
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.engine.loops.calls import LoopCalls
+from mstmm.runtime.engine.loops.loop_calls import LoopCalls
 from mstmm.runtime.integrate.steppers.genalpha import constants
 
 from ..constraints.scenes import cycloid, governor, on_a_plane, on_a_road

@@ -9,9 +9,9 @@ import pytest
 from reference.random_couplings import random_coupled
 
 import mstmm
-from mstmm.runtime.engine import tangent
-from mstmm.runtime.engine.across import Across, across_of, at_once
-from mstmm.runtime.engine.engine import Engine
+from mstmm.runtime.engine import tangent_matrix
+from mstmm.runtime.engine.looped_engine import LoopedEngine
+from mstmm.runtime.engine.off_tree_coupling import OffTreeCoupling, off_tree_coupling, single_group
 
 from ..bent.test_against_tree import hung, meshed, shackled
 from ..linkages import cranks, legs
@@ -63,14 +63,14 @@ SCENES = {
 }  # fmt: skip
 
 
-def engine_of(scene: dict[str, Any]) -> Engine:
+def engine_of(scene: dict[str, Any]) -> LoopedEngine:
     return mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
 
 
-def answers(engine: Engine, q: Any, u: Any, s: float) -> list[Any]:
+def answers(engine: LoopedEngine, q: Any, u: Any, s: float) -> list[Any]:
     """One step's answers to a right-hand side and to increments that are known."""
     rng = np.random.default_rng(SEED)
-    one = tangent.Tangent(engine)
+    one = tangent_matrix.TangentMatrix(engine)
     one.residual(0.1, q, u)
     one.factor(s, s)
     r, d_a = rng.normal(size=(2, engine.nu))
@@ -86,23 +86,23 @@ def test_answers_are_those_of_the_full_matrix(name: str, monkeypatch: pytest.Mon
     s = 1e5 if name == "Andrews" else 50.0
     found = answers(engine, *state, s)
 
-    def full(engine: Engine) -> Across:
-        own = across_of(engine)
-        return at_once(own.bodies, own.efforts, own.rows, engine.nu)
+    def full(engine: LoopedEngine) -> OffTreeCoupling:
+        own = off_tree_coupling(engine)
+        return single_group(own.bodies, own.efforts, own.rows, engine.nu)
 
-    monkeypatch.setattr(tangent, "across_of", full)
+    monkeypatch.setattr(tangent_matrix, "off_tree_coupling", full)
     for one, other in zip(found, answers(engine, *state, s), strict=True):
         assert np.abs(one - other).max() <= 1e-11 * np.abs(other).max()
 
 
 @pytest.mark.parametrize("make", [lambda n: four_bars(n, angle=0.7), on_a_frame, told])
 def test_passes_do_not_grow_with_the_windows(make: Any) -> None:
-    few, many = (across_of(engine_of(make(count))) for count in (8, 64))
+    few, many = (off_tree_coupling(engine_of(make(count))) for count in (8, 64))
     assert many.count == 8 * few.count
     assert len(many.passes) == len(few.passes) < 40
     assert many.width == few.width < 120
 
 
 def test_couplings_keep_all_in_one_group() -> None:
-    across = across_of(engine_of(random_coupled(4)[0]))
+    across = off_tree_coupling(engine_of(random_coupled(4)[0]))
     assert len(across.passes) == across.width == across.count

@@ -10,8 +10,8 @@ import pytest
 import mstmm
 
 from ..linkages import angles, four_bar
-from ..test_at_rest import five_bar
 from ..test_cuts import compiled
+from ..test_equilibrium import five_bar
 
 OMEGA = np.array([0.7, 3.0, 11.0, 40.0])
 

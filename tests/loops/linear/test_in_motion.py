@@ -12,12 +12,12 @@ from reference.compare import worst
 from reference.jets import Array
 
 import mstmm
-from mstmm.runtime.run.system import SceneSystem
+from mstmm.runtime.run.scene_system import SceneSystem
 
 from ..bent.test_against_tree import shackled, slider_crank
 from ..linkages import OBLIQUE, bricard, four_bar, rod
-from ..test_at_rest import five_bar
 from ..test_cuts import LAWS, compiled
+from ..test_equilibrium import five_bar
 from .test_driven import turned
 
 STEP, G = 5e-5, 9.81

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.runtime.linear.linear import Linear
+from mstmm.runtime.linear.linear_model import Linear
 from mstmm.runtime.linear.nonholonomic.linear_model import NonholonomicLinear
 
 Array = NDArray[Any]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.bridge.assembled import assembled
+from mstmm.pipeline.assembled_scene import assembled_scene
 
 from ..bent.test_against_tree import slider_crank
 from ..constraints.scenes import cycloid
@@ -45,7 +45,7 @@ def test_it_begins_where_the_wishes_led(what: str) -> None:
     if what == "driven":
         del scene["hinge"][0]["initial"]
     model = mstmm.compile(mstmm.Scene(**scene))
-    again = mstmm.compile(assembled(model))
+    again = mstmm.compile(assembled_scene(model))
     for found, wanted in zip(again.initial_state(), model.initial_state(), strict=True):
         assert np.abs(found - wanted).max() < 1e-9
     hinges = {hinge.name: hinge for hinge in again.scene.hinge}
@@ -77,7 +77,7 @@ def closed_chain(first: float) -> mstmm.Model:
 
 def test_members_of_a_chain_share_their_start() -> None:
     with pytest.raises(mstmm.SceneError, match=r'chain "rope".*share their start; write'):
-        assembled(closed_chain(0.5))
+        assembled_scene(closed_chain(0.5))
 
 
 def test_a_tree_stays_what_it_is() -> None:
@@ -85,4 +85,4 @@ def test_a_tree_stays_what_it_is() -> None:
     scene |= {"hinge": scene["hinge"][:1], "body": scene["body"][:1]}
     scene["hinge"][0].pop("cut")
     tree = mstmm.compile(mstmm.Scene(**scene))
-    assert assembled(tree) == tree.scene
+    assert assembled_scene(tree) == tree.scene

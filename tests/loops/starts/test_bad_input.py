@@ -55,25 +55,39 @@ SHARED = (
 )
 LEAD = {"name": "lead", "expression": "end.q", "equals": "1 + t"}
 REFUSED = {
-    "drives that cannot be": (driven(foot="0.9", end="1.2"),
-                              r'leaves 0\.10.* m with "foot", "end" held; ' + SHARED),
-    "drives at odds in speed": (driven(foot="0.9 + t", end=f"{REST!r}"),
-                                r'speeds given for "foot", "end" contradict .* m/s.*; ' + SHARED),
-    "drives a little apart": (driven(foot="0.9 + t", end=f"{REST + 4e-3!r} + t"),
-                              r"(violated by|leaves) 0\.00.*[:;] " + SHARED),
-    "drives of cut hinges": (driven(foot="0.9 + t", tip="0.3 + t"),
-                             r'rad with "foot", "tip" held; '
-                             r'the drives of hinges "foot" and "tip" move the same degree of'),
-    "a drive and a wish": (driven(foot="0.9 + t") | {"coupling": [LEAD]},
-                           r'with "foot" held.*drive less'),
-    "more held than is free": (held("foot", "end", off=0.2),
-                               r'with "foot", "end" held.*hold or drive less.*; hold keeps 2 '
-                               r"coordinates, the mechanism has 1 degree of freedom$"),
+    "drives that cannot be": (
+        driven(foot="0.9", end="1.2"),
+        r'leaves 0\.10.* m with "foot", "end" held; ' + SHARED,
+    ),
+    "drives at odds in speed": (
+        driven(foot="0.9 + t", end=f"{REST!r}"),
+        r'speeds given for "foot", "end" contradict .* m/s.*; ' + SHARED,
+    ),
+    "drives a little apart": (
+        driven(foot="0.9 + t", end=f"{REST + 4e-3!r} + t"),
+        r"(violated by|leaves) 0\.00.*[:;] " + SHARED,
+    ),
+    "drives of cut hinges": (
+        driven(foot="0.9 + t", tip="0.3 + t"),
+        r'rad with "foot", "tip" held; '
+        r'the drives of hinges "foot" and "tip" move the same degree of freedom',
+    ),
+    "a drive and a wish": (
+        driven(foot="0.9 + t") | {"coupling": [LEAD]},
+        r'with "foot" held.*drive less',
+    ),
+    "more held than is free": (
+        held("foot", "end", off=0.2),
+        r'with "foot", "end" held.*hold or drive less.*; hold keeps 2 '
+        r"coordinates, the mechanism has 1 degree of freedom$",
+    ),
     "one held out of reach": (held("end", off=-1.3), r'with "end" held; [^;]*$'),
     "speeds at odds": (fast(foot=1.0, end=5.0), r'speeds given for "foot", "end" contradict'),
-    "an axis off by a hundredth": (four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
-                                   'axis of hinge "end" is 0.01 rad'),
-}  # fmt: skip
+    "an axis off by a hundredth": (
+        four_bar(end={"axis": [math.sin(0.01), 0, math.cos(0.01)]}),
+        'axis of hinge "end" is 0.01 rad',
+    ),
+}
 
 
 @pytest.mark.parametrize("what", REFUSED)

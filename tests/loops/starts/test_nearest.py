@@ -10,8 +10,8 @@ import pytest
 from reference.jets import Array
 
 import mstmm
-from mstmm.bridge.nearest import nearest
-from mstmm.errors import OpenLoop
+from mstmm.errors import LoopClosureError
+from mstmm.pipeline.nearest_pose import nearest_pose_result
 from mstmm.runtime.result.result import Result
 
 from ..linkages import CRANK, FEET, OBLIQUE, ROCKER, bricard, cranks, four_bar, legs
@@ -98,9 +98,9 @@ def test_the_least_gap_is_that_of_the_geometry(cut: str, mass: float) -> None:
     with pytest.raises(mstmm.SceneError, match=f'hinge "{cut}" closes stays open') as caught:
         mstmm.compile(mstmm.Scene(**scene))
     error = caught.value
-    assert isinstance(error, OpenLoop) and abs(error.gap - least) < 1e-6
+    assert isinstance(error, LoopClosureError) and abs(error.gap - least) < 1e-6
     assert error.pose["foot"] == (2.6,)
-    drawn = nearest(mstmm.Scene(**scene), error)
+    drawn = nearest_pose_result(mstmm.Scene(**scene), error)
     gaps = {
         "knee": apart(drawn, "crank.tip", "coupler"),
         "tip": apart(drawn, "coupler.tip", "rocker.tip"),

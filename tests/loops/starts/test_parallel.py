@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.runtime.engine.loops.refinement import unlike_masses
+from mstmm.runtime.engine.loops.acceleration_refinement import mass_ratio_text
 
 from ..linkages import COUPLER, CRANK, OBLIQUE, four_bar, rod
 
@@ -177,4 +177,4 @@ def test_lost_digits_are_put_down_to_masses_only_where_these_are_unlike(
     engine = mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
     scene["body"][1] = rod("coupler", COUPLER, mass)
     engine.packed.expanded.described = mstmm.Scene(**scene)
-    assert found in unlike_masses(engine)
+    assert found in mass_ratio_text(engine)

@@ -4,33 +4,39 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...definition import Definition, Method
-from ...measures import energy_gain, simulated
-from ...scale import LOG
-from ...scenes import FALL, double_pendulum
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import energy_gain, simulate_to_end
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import FALL_ENERGY, double_pendulum
 
 STEP, STRETCH = 0.01, 1e-3
 
 
-def _gained(stiffness: float, **options: Any) -> float:
+def _relative_energy(stiffness: float, **options: Any) -> float:
     model = double_pendulum(stiffness, STRETCH)
-    return energy_gain(simulated(model, 2.0, "dttmm-classical", STEP, **options), FALL)
+    return energy_gain(simulate_to_end(model, 2.0, "dttmm-classical", STEP, **options), FALL_ENERGY)
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="classical-iteration",
     title="Classical method, one solution per step: unresolved stiff motion",
     why="The trapezoidal rule in absolute coordinates with one linear solution per step moves "
     "the bodies by the error of the first solution. A scheme that damps fast motion, iterated, "
     "holds up to about a hundred times that stiffness.",
-    parameter="stiffness of bushings (stretched by 1 mm)", unit="N/m", low=1e3, high=1e9, scale=LOG,
-    measured="largest energy in 2 s over that exchanged", limit=1.05,
-    method=Method(
-        "dttmm-classical, newmark, one solution", lambda k: _gained(k, scheme="newmark")
+    parameter="stiffness of bushings (stretched by 1 mm)",
+    unit="N/m",
+    low=1e3,
+    high=1e9,
+    scale=LOG_SCALE,
+    measured="largest energy in 2 s over that exchanged",
+    limit=1.05,
+    method=MethodDefinition(
+        "dttmm-classical, newmark, one solution", lambda k: _relative_energy(k, scheme="newmark")
     ),
-    remedy=Method(
+    remedy=MethodDefinition(
         "generalised-alpha:0.8, iterated",
-        lambda k: _gained(k, scheme="generalised-alpha:0.8", iterations=20),
-    ), reach=1e9,
+        lambda k: _relative_energy(k, scheme="generalised-alpha:0.8", iterations=20),
+    ),
+    reach=1e9,
     source="Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, 2019, ch. 7",
-)  # fmt: skip
+)

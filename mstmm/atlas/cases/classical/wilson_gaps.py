@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....runtime.classical.schemes import scheme_of
-from ...definition import Definition, Method
-from ...scale import LOG
-from ...scenes import double_pendulum
+from ....runtime.classical.integration_schemes import parse_scheme
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import double_pendulum
 from ...variants.classical_stepper import ClassicalSteps
 
 T_END, ITERATIONS = 1.0, 20
 
 
-def _gap(step: float, scheme: str) -> float:
+def _largest_gap(step: float, scheme: str) -> float:
     """Largest gap, m, in the pins of two falling rods of 1 m."""
-    run, largest = ClassicalSteps(double_pendulum(), scheme_of(scheme), ITERATIONS), 0.0
+    run, largest = ClassicalSteps(double_pendulum(), parse_scheme(scheme), ITERATIONS), 0.0
     for _ in range(round(T_END / step)):
         run.advance(step)
         upper, lower = run.moving()
@@ -24,18 +24,18 @@ def _gap(step: float, scheme: str) -> float:
     return largest
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="wilson-gaps",
     title="Wilson's method in absolute coordinates: hinges that open",
     why="Wilson's collocation satisfies the equations, and with them the constraints, after the "
     "end of the step. The hinges are closed there, but not at the end of the step to which the "
     "method returns. However far a step is iterated, the gaps are of fourth order in the step. "
     "Schemes that satisfy the constraints at the end of the step close them to rounding.",
-    parameter="length of a step", unit="s", low=2e-3, high=0.1, scale=LOG,
+    parameter="length of a step", unit="s", low=2e-3, high=0.1, scale=LOG_SCALE,
     measured="largest gap in 1 s, m", limit=1e-6,
-    method=Method("wilson, iterated", lambda step: _gap(step, "wilson")),
-    remedy=Method(
-        "generalised-alpha:0.8, iterated", lambda step: _gap(step, "generalised-alpha:0.8")
+    method=MethodDefinition("wilson, iterated", lambda step: _largest_gap(step, "wilson")),
+    remedy=MethodDefinition(
+        "generalised-alpha:0.8, iterated", lambda step: _largest_gap(step, "generalised-alpha:0.8")
     ),
     reach=0.1,
     source="Wilson, Farhoomand, Bathe, Earthquake Engineering and Structural Dynamics 1, 1973; "

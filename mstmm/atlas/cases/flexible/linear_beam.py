@@ -6,30 +6,30 @@ import math
 
 import numpy as np
 
-from ...definition import Definition, Method
-from ...measures import simulated
-from ...scale import LOG
-from ...scenes import model
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import simulate_to_end
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import compile_looped
 
 #: Duration of the spin-up, and of the run, s.
-RAMP, T_END = 15.0, 30.0
+SPIN_UP_TIME, T_END = 15.0, 30.0
 
 
 def _deflection(spin: float, stiffening: bool, shapes: int) -> float:
     """Largest deflection of the tip in a run, m."""
-    rate = spin / RAMP
-    ramp = f"{rate!r}*(t^2/2 + ({RAMP}/(2*pi))^2*(cos(2*pi*t/{RAMP}) - 1))"
+    rate = spin / SPIN_UP_TIME
+    ramp = f"{rate!r}*(t^2/2 + ({SPIN_UP_TIME}/(2*pi))^2*(cos(2*pi*t/{SPIN_UP_TIME}) - 1))"
     blade = {
         "name": "blade", "length": 10.0, "mass_per_length": 1.2, "bending_stiffness": 1.4e4,
         "modes": {"y": shapes}, "stiffening": stiffening,
     }  # fmt: skip
     hub = {
         "name": "hub", "type": "pin", "inboard": "ground", "outboard": "blade",
-        "drive": f"where(t < {RAMP}, {ramp}, {spin!r}*(t - {RAMP / 2}))",
+        "drive": f"where(t < {SPIN_UP_TIME}, {ramp}, {spin!r}*(t - {SPIN_UP_TIME / 2}))",
     }  # fmt: skip
     times = np.linspace(0.0, T_END, 301)
-    run = simulated(
-        model({"gravity": [0, 0, 0], "beam": [blade], "hinge": [hub]}), T_END, "rodas4p2",
+    run = simulate_to_end(
+        compile_looped({"gravity": [0, 0, 0], "beam": [blade], "hinge": [hub]}), T_END, "rodas4p2",
         rtol=1e-6, atol=1e-8, output_times=times,
     )  # fmt: skip
     return float(np.abs(run.deflection("blade", "tip")[:, 1]).max())
@@ -37,21 +37,27 @@ def _deflection(spin: float, stiffening: bool, shapes: int) -> float:
 
 def _error(spin: float, stiffening: bool) -> float:
     exact = _deflection(spin, True, 6)
-    found = _deflection(spin, stiffening, 3)
-    return abs(found / exact - 1) if math.isfinite(found) else math.inf
+    deflection = _deflection(spin, stiffening, 3)
+    return abs(deflection / exact - 1) if math.isfinite(deflection) else math.inf
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="linear-beam",
     title="Linear beam: spin above its first frequency",
     why="In the axes of a linear beam the centrifugal force increases every deflection. Nothing "
     "opposes it, because the shortening of the bent axis is neglected: at a spin equal to the "
     "first frequency the stiffness vanishes. With the shortening the spin stiffens the beam, as it "
     "should.",
-    parameter="spin after 15 s", unit="rad/s", low=0.5, high=8.0, scale=LOG,
-    measured="error of the tip's largest deflection, relative", limit=1.0,
-    method=Method("stiffening = false, 3 shapes", lambda spin: _error(spin, False)),
-    remedy=Method("stiffening = true, 3 shapes", lambda spin: _error(spin, True)), reach=16.0,
+    parameter="spin after 15 s",
+    unit="rad/s",
+    low=0.5,
+    high=8.0,
+    scale=LOG_SCALE,
+    measured="error of the tip's largest deflection, relative",
+    limit=1.0,
+    method=MethodDefinition("stiffening = false, 3 shapes", lambda spin: _error(spin, False)),
+    remedy=MethodDefinition("stiffening = true, 3 shapes", lambda spin: _error(spin, True)),
+    reach=16.0,
     source="Kane, Ryan, Banerjee, Journal of Guidance, Control, and Dynamics 10, 1987; Simo, "
     "Vu-Quoc, Journal of Applied Mechanics 53, 1986",
-)  # fmt: skip
+)

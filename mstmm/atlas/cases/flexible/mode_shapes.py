@@ -6,15 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ....arrays import Array
-from ....runtime.flexible.beam.gauss import gauss_between
-from ....runtime.flexible.beam.shapes import Eigenfunction
-from ...definition import Definition, Method
-from ...scale import COUNT
+from ....array_validation import Array
+from ....runtime.flexible.beam.gauss_quadrature import gauss_between
+from ....runtime.flexible.beam.shape_functions import Eigenfunction
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...parameter_scale import COUNT_SCALE
 from ...variants import textbook_shapes
 
 
-def _stable(number: int, xi: Array) -> Array:
+def _stable_shape(number: int, xi: Array) -> Array:
     return Eigenfunction("clamped-free", number, 0.0, 1.0)(xi)
 
 
@@ -25,16 +25,24 @@ def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
         return abs(float(weights @ shape(int(number), xi) ** 2) - 1)
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="mode-shapes",
     title="Mode shapes by hyperbolic functions: their number",
     why="In the printed form with cosh and sinh a shape is the difference of two numbers that "
     "grow by a factor of 23 per half-wave. At the end of about the eleventh shape no digit of it "
     "is left. The same shape written with exponentials that decay from both ends keeps all digits.",
-    parameter="number of the shape", unit="", low=1, high=60, scale=COUNT,
-    measured="error of the shape's square over the length", limit=1e-4,
-    method=Method("cosh and sinh", lambda n: _error(n, textbook_shapes.clamped_free)),
-    remedy=Method("decaying exponentials", lambda n: _error(n, _stable)), reach=1000,
+    parameter="number of the shape",
+    unit="",
+    low=1,
+    high=60,
+    scale=COUNT_SCALE,
+    measured="error of the shape's square over the length",
+    limit=1e-4,
+    method=MethodDefinition(
+        "cosh and sinh", lambda n: _error(n, textbook_shapes.clamped_free_shape)
+    ),
+    remedy=MethodDefinition("decaying exponentials", lambda n: _error(n, _stable_shape)),
+    reach=1000,
     source="Rao, Vibration of Continuous Systems, 2019, ch. 11; high numbers: Goncalves, "
     "Brennan, Elliott, Journal of Sound and Vibration 301, 2007",
-)  # fmt: skip
+)

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from ...definition import Definition, Method
-from ...measures import root_inertia
-from ...scale import LOG
-from ...variants import stiffness_quotient
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import root_inertia
+from ...parameter_scale import LOG_SCALE
+from ...variants import finite_difference_mass
 
 
 def _error(z: float, inertia: float) -> float:
-    return abs(inertia / stiffness_quotient.exact(z) - 1)
+    return abs(inertia / finite_difference_mass.exact_inertia(z) - 1)
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="short-parts",
     title="Exact beams: dynamic stiffness of short elements",
     why="Entries of the dynamic stiffness are quotients of circular and hyperbolic functions. "
@@ -20,13 +20,20 @@ CASE = Definition(
     "stiffness, next to which inertia is of the size of (beta L)^4. A beam divided into many "
     "elements loses its mass in rounding. The remedy computes the terms beyond the static "
     "stiffness as a power series.",
-    parameter="beta L of an element", unit="", low=1e-3, high=3.0, scale=LOG,
-    measured="error of the element's inertia, relative", limit=1e-6,
-    method=Method(
-        "quotients of sines", lambda z: _error(z, stiffness_quotient.inertia(z))
+    parameter="beta L of an element",
+    unit="",
+    low=1e-3,
+    high=3.0,
+    scale=LOG_SCALE,
+    measured="error of the element's inertia, relative",
+    limit=1e-6,
+    method=MethodDefinition(
+        "quotients of sines", lambda z: _error(z, finite_difference_mass.quotient_inertia(z))
     ),
-    remedy=Method("power series beyond the static part", lambda z: _error(z, root_inertia(z))),
+    remedy=MethodDefinition(
+        "power series beyond the static part", lambda z: _error(z, root_inertia(z))
+    ),
     reach=1e-6,
     source="Wittrick and Williams, Q. J. Mech. Appl. Math. 24, 1971 (dynamic stiffness); "
     "Przemieniecki, Theory of Matrix Structural Analysis, 1968, ch. 12 (its power series)",
-)  # fmt: skip
+)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...definition import Definition, Method
-from ...measures import simulated
-from ...scale import COUNT
-from ...scenes import model
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import simulate_to_end
+from ...parameter_scale import COUNT_SCALE
+from ...shared_scenes import compile_looped
 
 STEP, STEPS = 1e-3, 200
 
 
-def _angle(shapes: float, frame: str) -> float:
+def _largest_angle(shapes: float, frame: str) -> float:
     """Largest angle (rad) of the end of a beam of 1 m and 1 kg on a damped pin, from 1 rad/s."""
     beam = {
         "name": "beam", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0,
@@ -22,23 +22,31 @@ def _angle(shapes: float, frame: str) -> float:
         "name": "pin", "type": "pin", "inboard": "ground", "outboard": "beam",
         "law": {"damping": 1.0}, "initial": {"u": [1.0]},
     }  # fmt: skip
-    turning = model({"gravity": [0, 0, 0], "beam": [beam], "hinge": [pin]})
+    beam_model = compile_looped({"gravity": [0, 0, 0], "beam": [beam], "hinge": [pin]})
     times = np.arange(STEPS + 1) * STEP
-    run = simulated(turning, times[-1], "rk4", STEP, output_times=times)
+    run = simulate_to_end(beam_model, times[-1], "rk4", STEP, output_times=times)
     return float(np.abs(run.q[:, 0]).max())
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="tangent-frame",
     title="Frame tangent to a beam at a pinned end",
     why="Many clamped shapes together can nearly represent the rotation of a pinned beam without "
     "its frame. The inertia left for the frame falls with the third power of their number, and a "
     "damper in the pin then causes a motion faster than any of the beam. A chord frame, or the "
     "mean frame, has ten times more of the inertia.",
-    parameter="shapes of a beam on a damped pin", unit="", low=1, high=20, scale=COUNT,
-    measured="largest angle of the pinned end, rad", limit=1.0,
-    method=Method("tangent frame, rk4 with h = 1 ms", lambda n: _angle(n, "tangent")),
-    remedy=Method("mean frame, rk4 with h = 1 ms", lambda n: _angle(n, "mean")), reach=20,
+    parameter="shapes of a beam on a damped pin",
+    unit="",
+    low=1,
+    high=20,
+    scale=COUNT_SCALE,
+    measured="largest angle of the pinned end, rad",
+    limit=1.0,
+    method=MethodDefinition(
+        "tangent frame, rk4 with h = 1 ms", lambda n: _largest_angle(n, "tangent")
+    ),
+    remedy=MethodDefinition("mean frame, rk4 with h = 1 ms", lambda n: _largest_angle(n, "mean")),
+    reach=20,
     source="Schwertassek, Wallrapp, Shabana, Flexible multibody simulation and choice of shape "
     "functions, Nonlinear Dynamics 20 (1999), pp. 361-380",
-)  # fmt: skip
+)

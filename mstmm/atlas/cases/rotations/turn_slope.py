@@ -4,24 +4,32 @@ from __future__ import annotations
 
 from functools import partial
 
-from ...definition import Definition, Method
-from ...measures import TURNING, error_of_turning
-from ...scale import LOG
-from ...variants import chart_rosenbrock
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import ROTATION_TIME, attitude_error
+from ...parameter_scale import LOG_SCALE
+from ...variants import rotation_vector_rosenbrock
 
 TABLE = "rodas4p2"
-WITHOUT = partial(chart_rosenbrock.end_of, method=TABLE, slope=False)
+INCOMPLETE_VARIANT = partial(rotation_vector_rosenbrock.final_attitude, method=TABLE, slope=False)
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="turn-slope",
     title="Rosenbrock steps on rotation vectors: a missing derivative",
     why="A rotation vector starts every step at zero, where its rate is the angular velocity. "
     "The derivative of that rate by the vector, however, is half a product that does not vanish "
     "there. Without it in the tangent matrix all tables fall to second order. Runs include it.",
-    parameter="length of a step", unit="s", low=4e-3, high=0.1, scale=LOG,
-    measured=f"error of the attitude after {TURNING:g} s, rad", limit=1e-6,
-    method=Method(f"{TABLE}, the derivative left out", lambda h: error_of_turning(WITHOUT, h)),
-    remedy=Method(TABLE, lambda h: error_of_turning(TABLE, h)), reach=0.1,
+    parameter="length of a step",
+    unit="s",
+    low=4e-3,
+    high=0.1,
+    scale=LOG_SCALE,
+    measured=f"error of the attitude after {ROTATION_TIME:g} s, rad",
+    limit=1e-6,
+    method=MethodDefinition(
+        f"{TABLE}, the derivative left out", lambda h: attitude_error(INCOMPLETE_VARIANT, h)
+    ),
+    remedy=MethodDefinition(TABLE, lambda h: attitude_error(TABLE, h)),
+    reach=0.1,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7 (order takes "
     "the whole Jacobian); Munthe-Kaas, BIT 38, 1998",
-)  # fmt: skip
+)

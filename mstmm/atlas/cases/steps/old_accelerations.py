@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...definition import Definition, Method
-from ...measures import simulated
-from ...scale import LOG
-from ...scenes import double_pendulum
-from ...variants.plain_rosenbrock import Steps
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import simulate_to_end
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import double_pendulum
+from ...variants.bare_rosenbrock import BareRosenbrock
 
 T_END = 0.5
 
@@ -16,15 +16,17 @@ T_END = 0.5
 def _error(step: float, old: bool) -> float:
     rods, steps = double_pendulum(), round(T_END / step)
     step = T_END / steps
-    exact = simulated(rods, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
+    exact = simulate_to_end(rods, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
     if old:
-        found = Steps(rods, "rodas5p", accelerations=np.zeros(2)).fixed(step, steps)[-1, 0]
+        angles = BareRosenbrock(rods, "rodas5p", accelerations=np.zeros(2)).fixed(step, steps)[
+            -1, 0
+        ]
     else:
-        found = simulated(rods, T_END, "rodas5p", step, output_times=[T_END]).q[-1]
-    return float(np.abs(found - exact).max())
+        angles = simulate_to_end(rods, T_END, "rodas5p", step, output_times=[T_END]).q[-1]
+    return float(np.abs(angles - exact).max())
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="old-accelerations",
     title="Accelerations from before an event: rods that are released",
     why="Steps with accelerations as unknowns start from those of the step before. After a "
@@ -32,9 +34,9 @@ CASE = Definition(
     "wrong state. The first step then has a lasting error of lower order. Here two rods are "
     "released whose accelerations were zero before. One evaluation corrects them; every run makes "
     "it after each event and each discontinuity of the equations.",
-    parameter="length of a step", unit="s", low=1e-3, high=0.05, scale=LOG,
+    parameter="length of a step", unit="s", low=1e-3, high=0.05, scale=LOG_SCALE,
     measured="error of the angles after 0.5 s, rad", limit=1e-9,
-    method=Method("rodas5p, accelerations kept", lambda step: _error(step, True)),
-    remedy=Method("rodas5p", lambda step: _error(step, False)), reach=0.05,
+    method=MethodDefinition("rodas5p, accelerations kept", lambda step: _error(step, True)),
+    remedy=MethodDefinition("rodas5p", lambda step: _error(step, False)), reach=0.05,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.7 and VI.4",
 )  # fmt: skip

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...definition import Definition, Method
-from ...measures import energy_gain, simulated
-from ...scale import LOG
-from ...scenes import FALL, double_pendulum
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import energy_gain, simulate_to_end
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import FALL_ENERGY, double_pendulum
 
 STEP = 0.01
 
 
-def _gained(stiffness: float, method: str, **options: Any) -> float:
-    run = simulated(double_pendulum(stiffness), 1.0, method, STEP, **options)
-    return energy_gain(run, FALL)
+def _relative_energy(stiffness: float, method: str, **options: Any) -> float:
+    run = simulate_to_end(double_pendulum(stiffness), 1.0, method, STEP, **options)
+    return energy_gain(run, FALL_ENERGY)
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="predicted-loads",
     title="One linearised equation per step: rotation of predicted loads",
     why="A predictor has an error of third order in the length of a spring, and the load there "
@@ -27,11 +27,11 @@ CASE = Definition(
     "sign. The classical form in absolute coordinates, with damping, rotates only the loads that "
     "the springs had before.",
     parameter="stiffness of bushings (slack at the start)", unit="N/m", low=1e3, high=1e9,
-    scale=LOG, measured="largest energy in 1 s over that exchanged", limit=1.05,
-    method=Method("dttmm, h = 10 ms", lambda k: _gained(k, "dttmm")),
-    remedy=Method(
+    scale=LOG_SCALE, measured="largest energy in 1 s over that exchanged", limit=1.05,
+    method=MethodDefinition("dttmm, h = 10 ms", lambda k: _relative_energy(k, "dttmm")),
+    remedy=MethodDefinition(
         "dttmm-classical, generalised-alpha:0.8",
-        lambda k: _gained(k, "dttmm-classical", scheme="generalised-alpha:0.8"),
+        lambda k: _relative_energy(k, "dttmm-classical", scheme="generalised-alpha:0.8"),
     ), reach=1e12,
     source="Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, 2019, ch. 7; Negrut, "
     "Jay, Khude, Journal of Computational and Nonlinear Dynamics 4, 2009",

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from ...definition import Definition, Method
-from ...measures import growth
-from ...scale import LOG
-from ...scenes import sprung_rod
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import relative_growth
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import sprung_rod
 
 STIFFNESS, STEP, STEPS = 100.0, 1e-3, 400
 
 
 def _growth(damping: float, method: str) -> float:
-    return growth(sprung_rod(STIFFNESS, damping), STEP, STEPS, method)
+    return relative_growth(sprung_rod(STIFFNESS, damping), STEP, STEPS, method)
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="rk4-damping",
     title="Explicit steps: strength of a damper",
     why="A strong damper stops a motion within a time that is unrelated to the motion that "
     "follows. Explicit steps must still be shorter than 2.785 times that time, or they are "
     "unstable; implicit ones need not resolve it.",
-    parameter="damping of a rod's pin", unit="N m s/rad", low=1.0, high=1e8, scale=LOG,
+    parameter="damping of a rod's pin", unit="N m s/rad", low=1.0, high=1e8, scale=LOG_SCALE,
     measured="largest over initial angle in 400 steps", limit=1.01,
-    method=Method("rk4, h = 1 ms", lambda c: _growth(c, "rk4")),
-    remedy=Method("rodas4p2, h = 1 ms", lambda c: _growth(c, "rodas4p2")), reach=1e10,
+    method=MethodDefinition("rk4, h = 1 ms", lambda c: _growth(c, "rk4")),
+    remedy=MethodDefinition("rodas4p2, h = 1 ms", lambda c: _growth(c, "rodas4p2")), reach=1e10,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.2",
 )  # fmt: skip

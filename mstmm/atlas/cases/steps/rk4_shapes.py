@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...definition import Definition, Method
-from ...measures import simulated
-from ...scale import COUNT
-from ...scenes import model
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import simulate_to_end
+from ...parameter_scale import COUNT_SCALE
+from ...shared_scenes import compile_looped
 
 STEP, T_END = 1e-3, 0.2
 
@@ -19,21 +19,21 @@ def _deflection(shapes: float, method: str) -> float:
         "modes": {"y": int(shapes)}, "stiffening": False,
     }  # fmt: skip
     wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "beam"}
-    falling = model({"gravity": [0, -9.81, 0], "beam": [beam], "hinge": [wall]})
-    run = simulated(falling, T_END, method, STEP)
+    beam_model = compile_looped({"gravity": [0, -9.81, 0], "beam": [beam], "hinge": [wall]})
+    run = simulate_to_end(beam_model, T_END, method, STEP)
     return float(np.abs(run.deflection("beam", "tip")[:, 1]).max())
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="rk4-shapes",
     title="Explicit steps: number of shapes of a beam",
     why="Frequencies of shapes grow with the square of their number, and an explicit step must "
     "resolve the highest, even if the motion is that of the first. Use few suitable shapes, or "
     "implicit steps, which damp what they do not resolve.",
-    parameter="shapes of a clamped beam", unit="", low=1, high=20, scale=COUNT,
+    parameter="shapes of a clamped beam", unit="", low=1, high=20, scale=COUNT_SCALE,
     measured="largest tip deflection over the length", limit=0.1,
-    method=Method("rk4, h = 1 ms", lambda n: _deflection(n, "rk4")),
-    remedy=Method("rodas4p2, h = 1 ms", lambda n: _deflection(n, "rodas4p2")), reach=20,
+    method=MethodDefinition("rk4, h = 1 ms", lambda n: _deflection(n, "rk4")),
+    remedy=MethodDefinition("rodas4p2, h = 1 ms", lambda n: _deflection(n, "rodas4p2")), reach=20,
     source="Hairer, Wanner, Solving Ordinary Differential Equations II, 1996, IV.2; shapes: Rao, "
     "Vibration of Continuous Systems, 2019, ch. 11",
 )  # fmt: skip

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...definition import Definition, Method
-from ...measures import simulated
-from ...scale import LOG
-from ...scenes import model
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import simulate_to_end
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import compile_looped
 
-STEP, PHASES = 0.01, 40
+STEP, PHASE_COUNT = 0.01, 40
 
 
 def _rebound(rate: float, fixed: bool) -> float:
@@ -23,27 +23,33 @@ def _rebound(rate: float, fixed: bool) -> float:
         "outboard": "mass", "law": {"limits": stop},
     }  # fmt: skip
     mass = {"name": "mass", "mass": 1.0}
-    falling = model({"gravity": [0, 0, 0], "body": [mass], "hinge": [slide]})
+    mass_model = compile_looped({"gravity": [0, 0, 0], "body": [mass], "hinge": [slide]})
     t_end = STEP * round((np.pi / rate) + 8)
     speeds = []
-    for phase in np.arange(PHASES) / PHASES:
+    for phase in np.arange(PHASE_COUNT) / PHASE_COUNT:
         start = [STEP * (1 + phase)], [-1.0]
         settings = {"step": STEP} if fixed else {"rtol": 1e-6, "atol": 1e-9}
-        run = simulated(falling, t_end, "genalpha", initial=start, **settings)
+        run = simulate_to_end(mass_model, t_end, "genalpha", initial=start, **settings)
         speeds.append(float(run.u[-1, 0]))
     return max(speeds) ** 2
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="undamped-stop",
     title="Fixed steps across a stop without damping",
     why="A stop is a spring that starts suddenly. The contact occurs within a step, but the step "
     "assumes it from its start or its end on, so that the rebound has another energy than the "
     "approach. It is larger or smaller depending on the position within the step, and more so the "
     "stiffer the stop. Steps with error control shrink until the contact is resolved.",
-    parameter="step times angular frequency on the stop", unit="", low=0.1, high=100.0, scale=LOG,
-    measured="energy after over that before the rebound", limit=1.05,
-    method=Method("genalpha, fixed steps", lambda rate: _rebound(rate, True)),
-    remedy=Method("genalpha, rtol = 1e-6", lambda rate: _rebound(rate, False)), reach=1e4,
+    parameter="step times angular frequency on the stop",
+    unit="",
+    low=0.1,
+    high=100.0,
+    scale=LOG_SCALE,
+    measured="energy after over that before the rebound",
+    limit=1.05,
+    method=MethodDefinition("genalpha, fixed steps", lambda rate: _rebound(rate, True)),
+    remedy=MethodDefinition("genalpha, rtol = 1e-6", lambda rate: _rebound(rate, False)),
+    reach=1e4,
     source="Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 1993, II.6",
-)  # fmt: skip
+)

@@ -6,23 +6,23 @@ from typing import Any
 
 import numpy as np
 
-from ....arrays import Array
+from ....array_validation import Array
 from ....errors import NumericalFailure, SceneError
-from ...definition import Definition, Method
-from ...measures import rounding
-from ...scale import LOG
-from ...scenes import ROD, model
+from ...case_definition import CaseDefinition, MethodDefinition
+from ...error_measures import rounding_error
+from ...parameter_scale import LOG_SCALE
+from ...shared_scenes import ROD_TRANSVERSE_INERTIA, compile_looped
 
 #: Along the rod, in the axes of its body, and two directions across it.
-ALONG = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
-ACROSS = np.array([3.0, 0.0, -1.0]) / np.sqrt(10.0)
-THIRD = np.cross(ALONG, ACROSS)
+ROD_AXIS = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+FIRST_NORMAL = np.array([3.0, 0.0, -1.0]) / np.sqrt(10.0)
+SECOND_NORMAL = np.cross(ROD_AXIS, FIRST_NORMAL)
 
 #: Hinges, and a state of each.
 BALL = {"type": "ball"}
-UNIVERSAL = {"type": "universal", "axis": ACROSS.tolist(), "axis2": THIRD.tolist()}
-TURNED = np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.7, -0.2, 0.4])
-BENT = np.array([0.3, -0.5]), np.array([0.7, -0.2])
+UNIVERSAL = {"type": "universal", "axis": FIRST_NORMAL.tolist(), "axis2": SECOND_NORMAL.tolist()}
+BALL_STATE = np.array([0.5, 0.5, 0.5, 0.5]), np.array([0.7, -0.2, 0.4])
+UNIVERSAL_STATE = np.array([0.3, -0.5]), np.array([0.7, -0.2])
 
 
 def _error(ratio: float, foot: dict[str, Any], state: tuple[Array, Array]) -> float:
@@ -30,21 +30,21 @@ def _error(ratio: float, foot: dict[str, Any], state: tuple[Array, Array]) -> fl
 
     `ratio` is its moment of inertia about its axis over that across.
     """
-    tensor = ROD * (np.eye(3) + (ratio - 1) * np.outer(ALONG, ALONG))
+    tensor = ROD_TRANSVERSE_INERTIA * (np.eye(3) + (ratio - 1) * np.outer(ROD_AXIS, ROD_AXIS))
     rod = {
-        "name": "rod", "mass": 1.0, "center_of_mass": (ALONG / 2).tolist(),
+        "name": "rod", "mass": 1.0, "center_of_mass": (ROD_AXIS / 2).tolist(),
         "inertia": [*np.diag(tensor).tolist(), *tensor[np.triu_indices(3, 1)].tolist()],
     }  # fmt: skip
     hinge = {"name": "foot", "inboard": "ground", "outboard": "rod"} | foot
     scene = {"gravity": [0, -9.81, 0], "body": [rod], "hinge": [hinge]}
     try:
-        found = model(scene)
-    except SceneError as refused:  # the inertia is the only possible reason in this scene
-        raise NumericalFailure(str(refused)) from None
-    return rounding(found, [state])
+        rod_model = compile_looped(scene)
+    except SceneError as failure:  # the inertia is the only possible reason in this scene
+        raise NumericalFailure(str(failure)) from None
+    return rounding_error(rod_model, [state])
 
 
-CASE = Definition(
+CASE = CaseDefinition(
     name="thin-rod",
     title="Riccati sweep: a hinge that rotates a body without inertia",
     why="The sweep divides by the inertia D of the free motions of a hinge. A ball lets a rod "
@@ -53,11 +53,11 @@ CASE = Definition(
     "of the mean a pivot of D counts as zero, and the run stops and names the hinge. A motion "
     "without inertia should not be free: a universal hinge constrains the spin.",
     parameter="moment of inertia along a rod over that across", unit="",
-    low=1e-18, high=0.1, scale=LOG,
+    low=1e-18, high=0.1, scale=LOG_SCALE,
     measured="error of the accelerations, relative", limit=1e-6,
-    method=Method("ball", lambda ratio: _error(ratio, BALL, TURNED)),
-    remedy=Method(
-        "universal hinge, spin constrained", lambda ratio: _error(ratio, UNIVERSAL, BENT)
+    method=MethodDefinition("ball", lambda ratio: _error(ratio, BALL, BALL_STATE)),
+    remedy=MethodDefinition(
+        "universal hinge, spin constrained", lambda ratio: _error(ratio, UNIVERSAL, UNIVERSAL_STATE)
     ),
     reach=1e-20,
     source="Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 7 and 10 (D, singular "

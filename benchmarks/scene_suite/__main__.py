@@ -1,0 +1,87 @@
+"""Standing charts: eight scenes, mstmm's methods and their peers, CPU time against achieved error.
+
+    python -m benchmarks.scene_suite [SCENE ...] [--rounds N] [--budget S] [--quick] [--plot]
+
+Each scene is charted as `mstmm chart` does it: every method of mstmm over its tolerances or steps
+against a reference whose own error is stated, on both engines; the error is that of the place of
+one end (m) at the end of the run.  Peers run the same scene and are held against the same
+reference.  Then the cheapest settings of everybody are timed again in alternating rounds of one
+process: CPU time of one whole warm call that gives the end of the motion, the least of the rounds.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import warnings
+from argparse import ArgumentParser
+from pathlib import Path
+
+from ..common import measure
+from .cases import CASES
+from .report import page, table
+from .side_by_side import Limits, compared
+
+HERE = Path(__file__).resolve().parent
+DOCS = HERE.parents[1] / "docs"
+
+
+def arguments() -> ArgumentParser:
+    """What the command understands."""
+    parser = ArgumentParser(
+        "python -m benchmarks.scene_suite", description=str(__doc__).split("\n")[0]
+    )
+    parser.add_argument("scene", nargs="*", help=f"of {', '.join(CASES)}; all unless given")
+    parser.add_argument("--out", type=Path, default=HERE, help="folder of result.json, .md, .png")
+    parser.add_argument("--rounds", type=int, default=Limits.rounds, help="alternating rounds")
+    parser.add_argument("--budget", type=float, default=Limits.budget,
+                        help="clock s of mstmm's settings, for each scene")  # fmt: skip
+    parser.add_argument("--limit", type=float, default=Limits.run,
+                        help="CPU s of a peer's run behind which its curve ends")  # fmt: skip
+    parser.add_argument("--methods", default="", help="mstmm's, by name, with commas; all of them")
+    parser.add_argument("--no-peers", action="store_true", help="mstmm alone")
+    parser.add_argument(
+        "--quick", action="store_true", help="few settings and rounds: does it run?"
+    )
+    parser.add_argument("--plot", action="store_true", help="only draw what the JSON holds")
+    return parser
+
+
+def main(given: list[str] | None = None) -> None:
+    """Measure; write result.json, result.md and the picture after every scene."""
+    parser = arguments()
+    options = parser.parse_args(given)
+    if unknown := [name for name in options.scene if name not in CASES]:
+        parser.error(f"no scene {unknown[0]!r}; there are {', '.join(CASES)}")
+    methods = tuple(name for name in options.methods.split(",") if name)
+    limits = Limits(options.budget, options.limit, options.rounds, 1, methods)
+    if options.quick:
+        limits = Limits(min(5.0, options.budget), 0.2, 1, 4, methods)
+    file = options.out / "result.json"
+    kept = {}
+    if file.exists():
+        kept = {one["case"]: one for one in json.loads(file.read_text())["results"]}
+    warnings.simplefilter("ignore")  # of integrators that struggle
+    for name in [] if options.plot else options.scene or list(CASES):
+        kept[name] = compared(
+            CASES[name], limits, not options.no_peers, lambda text: print(text, flush=True)
+        )
+        print(*(f"{name}: left out: {why}" for why in kept[name]["missing"]), sep="\n", flush=True)
+        results = [kept[one] for one in CASES if one in kept]
+        measure.save(file, results, unit="CPU ms of one run", rounds=limits.rounds)
+    record = json.loads(file.read_text())
+    print(table(record))
+    places = [(options.out / "result.md", options.out / "result.png")]
+    if options.out == HERE:
+        places.append(
+            (DOCS / "benchmarks" / "scene-comparison.md", DOCS / "images" / "standing.png")
+        )
+    from .picture import draw
+
+    for text, picture in places:
+        draw(record, picture)
+        text.write_text(page(record, os.path.relpath(picture, text.parent)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,143 @@
+"""Element -> ElementSpec: derive and lower every kernel an element offers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from mstmm.ir import KernelIR
+from mstmm.ir.element_spec import ElementSpec
+from mstmm.ir.hinge_properties import HingeProperties, hinge_properties
+
+from ..classical.catalogue import CLASSICAL, RUN_ELEMENTS, classical_derivation, classical_spec
+from ..definition.element import Hinge
+from ..equations import riccati_sweep
+from ..equations.hinge import speeds_of
+from .kernels import (
+    FRAME_DERIVATIONS,
+    MAX_SPEEDS,
+    Kernel,
+    beam_kernels,
+    frame_kernels,
+    generic_kernels,
+    kernels_of,
+    law_kernels,
+    link_kernels,
+    link_names,
+    loop_kernels,
+    modal_kernels,
+    qr_kernels,
+    screw_kernels,
+    tangent_kernels,
+)
+from .planar_kernels import planar_spec
+from .registry import Element, builtin_elements, builtin_hinges, kind_of
+from .tangent_kernels import with_slopes
+
+__all__ = [
+    "FRAME_DERIVATIONS",
+    "MAX_SPEEDS",
+    "all_facts",
+    "all_specs",
+    "generic_spec",
+    "on_demand_specs",
+    "shared_specs",
+    "spec_from",
+    "spec_of",
+]
+
+
+def _lowered(kernels: tuple[Kernel, ...], group: str = "") -> tuple[KernelIR, ...]:
+    return with_slopes(group, (kernel.ir() for kernel in kernels))
+
+
+def spec_of(element: Element) -> ElementSpec:
+    """Derive and lower the kernels of any element, built in or the user's."""
+    return spec_from(element, kernels_of(element))
+
+
+def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
+    """The element with its kernels, once they are derived."""
+    hinge = element if isinstance(element, Hinge) else None
+    lowered = _lowered(kernels, kind_of(element))
+    return ElementSpec(
+        kind_of(element),
+        element.name,
+        element.title or element.name,
+        hinge.coordinates if hinge else (),
+        speeds_of(hinge) if hinge else (),
+        element.parameters,
+        lowered,
+        element.sources,
+        None if hinge is None else hinge_facts(hinge, lowered),
+    )
+
+
+def hinge_facts(hinge: Hinge, kernels: Sequence[KernelIR]) -> HingeProperties:
+    """What a hinge leaves free, by its kernel "hinge"."""
+    motion = next(kernel for kernel in kernels if kernel.name == "hinge")
+    return hinge_properties(
+        motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame,
+        hinge.keys, hinge.allows or hinge.title,
+    )  # fmt: skip
+
+
+def all_facts(specs: Sequence[ElementSpec]) -> list[HingeProperties]:
+    """Facts of the built-in hinges, the fewest speeds first."""
+    known = {spec.name: spec.facts for spec in specs if spec.facts is not None}
+    for hinge in builtin_hinges():
+        if hinge.runs_as:
+            known[hinge.name] = replace(
+                known[hinge.runs_as], name=hinge.name, allows=hinge.allows, runs_as=hinge.runs_as
+            )
+    return sorted(known.values(), key=lambda facts: (len(facts.speeds), facts.name))
+
+
+def generic_spec(nu: int) -> ElementSpec:
+    """The sweep's steps for any hinge with `nu` free speeds."""
+    return ElementSpec(
+        "sweep", f"generic{nu}", f"sweep across a hinge with {nu} speeds", (), (), (),
+        _lowered(generic_kernels(nu), "generic"), riccati_sweep.SOURCES,
+    )  # fmt: skip
+
+
+def shared_specs() -> list[ElementSpec]:
+    """What is no element of a scene: frames, laws, generic sweep."""
+    plain = partial(ElementSpec, "sweep", coordinates=(), speeds=(), parameters=())
+    frames, laws = _lowered(frame_kernels(), "frames"), _lowered(law_kernels(), "laws")
+    screws = _lowered(screw_kernels())
+    return [
+        plain(name="frames", title="poses, points and loads", kernels=frames),
+        plain(name="laws", title="laws on hinge coordinates", kernels=laws),
+        plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
+        plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels(), "modal")),
+        plain(name="tangent", title="tangent of a step", kernels=_lowered(tangent_kernels())),
+        plain(name="loops", title="closed loops", kernels=_lowered(loop_kernels(), "loops")),
+        plain(name="qr", title="sweep as least squares", kernels=_lowered(qr_kernels())),
+        plain(name="screw", title="transport across axial screws", kernels=screws),
+        *(
+            plain(
+                name=f"link_{name}",
+                title=title,
+                kernels=_lowered(link_kernels(name)),
+            )
+            for name, title in link_names().items()
+        ),
+        *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),
+    ]
+
+
+def all_specs() -> list[ElementSpec]:
+    """Everything that is generated: what runs need, compiled or replayed."""
+    made = [*(spec_of(e) for e in builtin_elements()), *shared_specs()]
+    return [*made, planar_spec(made), *(classical_spec(name) for name in RUN_ELEMENTS)]
+
+
+def on_demand_specs() -> list[ElementSpec]:
+    """Classical matrices that no run needs, without their kernels."""
+    made = ((name, classical_derivation(name)) for name in CLASSICAL if name not in RUN_ELEMENTS)
+    return [
+        ElementSpec("classical", name, matrix.title, (), (), (), (), matrix.sources)
+        for name, matrix in made
+    ]

@@ -1,0 +1,110 @@
+"""Kernels that are differentiated: what the tangents of the sweep are made of.
+
+Behind a kernel `name` of the table stands `name_slope`, which gives the derivatives of its outputs
+along a direction; it is the kernel's own IR differentiated operation by operation (one-sided where
+a law has a kink), so that the equations of an element are stated once.  A slope kernel reads what
+the kernel reads, `d_PORT` for each of the ports that move, and gives `d_PORT` for its outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from mstmm.ir import KernelIR
+from mstmm.ir.differentiation import differentiate, jacobian
+
+from .combined_hinge_kernels import across_kernels
+
+#: Suffix of the name of a differentiated kernel.
+SLOPE = "_slope"
+#: Kernels that give all derivatives of an output by a port, a row an entry of the port: name ->
+#: (kernel, port, output), by kind of the element.
+_WHOLE = {
+    "body": {"load_by_motion": ("bias_load", "motion", "e")},
+    "hinge": {
+        "rates_by_coordinates": ("hinge", "q", "qdot"),
+        "rates_by_speeds": ("hinge", "u", "qdot"),
+    },
+}
+
+#: kernel -> (ports that move, outputs wanted; none named: all), by kind and name of the element.
+#: "generic" stands for the steps for any hinge, "hinge", "body" and "force" for every element.
+_MOVING: dict[str, dict[str, tuple[str, str]]] = {
+    "hinge": {"hinge": ("q u", "")},
+    "body": {"bias_load": ("motion", "")},
+    "force": {"wrench": ("t A_F x_F v_F w_F A_T x_T v_T w_T effort", "F M")},
+    "laws": {
+        "linear": ("q u effort", "tau"),
+        "full": ("q u effort", "tau"),
+        "rotation": ("q u effort", "tau"),
+        "six": ("q u effort", "tau"),
+    },
+    "generic": {
+        "forward": ("R d H v w c s motion_I", ""),
+        "effort": ("H f", ""),
+        "complement": ("H", ""),
+        "answered": ("y z", ""),
+        "pull": ("y x", ""),
+    },
+    "frames": {
+        "pose": ("A_I x_I Rc r", ""),
+        "velocity": ("Rc r v_I w_I v_rel", ""),
+        "point": ("A x v motion", "x_K v_K"),
+        "turning": ("A motion", "w_K"),
+        "end_frame": ("A", ""),
+        "applied_load": ("A A_F F M", ""),
+        "opposite": ("x_F x_T F M", ""),
+        "length": ("x_F x_T v_F v_T", ""),
+        "transport": ("Rc r e", ""),
+        "driven_effort": ("felt udot tau", ""),
+    },
+    "loops": {
+        "meet": ("A_C x_C A_B x_B Rc r", ""),
+        "slip": ("R_C d v_C w_C v_B w_B", ""),
+        "drift": ("R_C d slip motion_C motion_B", ""),
+        "row": ("w R_C Rc r_A", ""),
+        "known": ("W relative", ""),
+        "act": ("J tau", ""),
+        "loaded": ("K x", ""),
+        "distance": ("d", "W"),
+        "distance_drift": ("d slip", ""),
+        "plane": ("d", "W"),
+        "rolling": ("R_C d", "W"),
+        "rolling_drift": ("R_C slip", ""),
+    },
+    "modal": {
+        "residual": ("eta etad motion", "S_rf e e_f"),
+        "prescribed": ("S_rf s", ""),
+        "momentum": ("eta etad v w", "h h_f"),
+        "section": ("eta etad", ""),
+        "outward": ("x Psi xd Psid xdd Psidd", ""),
+        "inward": ("x Psi xd Psid xdd Psidd", ""),
+        "subspace": ("H6 Phi", ""),
+        "imposed": ("H s c", ""),
+        "modal_effort": ("H e e_f", ""),
+    },
+}
+
+
+def with_slopes(group: str, kernels: Iterable[KernelIR]) -> tuple[KernelIR, ...]:
+    """The kernels, and behind them the slopes of those that are differentiated, and of hinges what
+    does several steps in one."""
+    kernels = tuple(kernels)
+    moving = _MOVING.get(group, {})
+    slopes = [slope(k, *moving[k.name]) for k in kernels if k.name in moving]
+    known = {kernel.name: kernel for kernel in kernels}
+    for name, (kernel, port, output) in _WHOLE.get(group, {}).items():
+        if next(p for p in known[kernel].inputs if p.name == port).length():
+            slopes.append(replace(jacobian(known[kernel], port, output), name=name))
+    if group == "hinge":
+        slopes += across_kernels(known["hinge"])
+    return (*kernels, *slopes)
+
+
+def slope(kernel: KernelIR, ports: str, outputs: str) -> KernelIR:
+    """One kernel differentiated; names of ports that it does not have are passed over."""
+    known = {port.name for port in kernel.inputs}
+    moving = [name for name in ports.split() if name in known]
+    found = differentiate(kernel, moving, outputs.split() or None, values=False, guards=False)
+    return replace(found, name=kernel.name + SLOPE)

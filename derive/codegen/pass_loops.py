@@ -1,0 +1,222 @@
+"""Loops over the subjects of passes, and the sweeps that run them, as C of the looped engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..schedule.pass_steps import TIPS_TO_ROOT, Pass, Run, Sweep
+from ..schedule.sweeps import SWEEPS
+from .cache_tiling import ChainedPasses, TiledRun, tile_sweep
+from .prefetch import prefetch_function
+from .schedule_conditions import condition_text
+
+#: Number of subjects of a pass in a scene.
+_SUBJECT_COUNTS = {
+    "body": "n_bodies", "law": "n_laws", "load": "n_loads", "force": "n_forces",
+    "drive": "n_drives", "speed": "nu", "row": "n_rows",
+    "coupling": "n_couplings", "closure": "n_closures",
+}  # fmt: skip
+#: First index of a loop, where earlier subjects are visited with the bodies they close on.
+_FIRST_INDICES = {"row": "model->first_ground_row"}
+#: Subjects in the order of bodies: counter, number of subjects, and the last body that a subject
+#: refers to.
+_ORDERED_SUBJECTS = {
+    "law": ("law", "n_laws", "model->laws[law].body"),
+    "closure": ("loop", "n_closures", "mstmm_last_of(model, loop)"),
+}
+#: Laws of the bodies that a tile begins, in the order of bodies.
+_LAW_RANGE = """\
+        const int behind = law;
+        while (law > 0 && model->laws[law - 1].body >= least) law--;
+"""
+
+
+def loop_functions() -> list[str]:
+    """C functions of every loop, followed by those of every sweep."""
+    groups = [tile_sweep(sweep) for sweep in SWEEPS]
+    runs = [run for parts in groups for part in parts for run in _separate_runs(part)]
+    separate_passes = {run.whole.name: run.whole for run in runs if run.whole}
+    tiles = [part for parts in groups for part in parts if not isinstance(part, Run)]
+    return [
+        *(_pass_loop(sweep_pass) for sweep_pass in separate_passes.values()),
+        *(
+            _tiled_function(group) if isinstance(group, TiledRun) else _chained_function(group)
+            for group in tiles
+        ),
+        *(_sweep_function(sweep, parts) for sweep, parts in zip(SWEEPS, groups, strict=True)),
+    ]
+
+
+def _separate_runs(part: Run | TiledRun | ChainedPasses) -> Iterable[Run]:
+    """Runs that need a separate loop."""
+    if isinstance(part, Run):
+        return [part]
+    return part.runs if part.hindrances else []
+
+
+def _pass_loop(whole: Pass) -> str:
+    """C function that runs a pass for all subjects, in its order."""
+    call_text, fetches = _subject_call(whole), ""
+    if whole.spares_links:
+        text = (
+            "    for (int k = 0; k < model->n_runs; k++) {\n"
+            "        const mstmm_branch *run = &model->runs[k];\n"
+            f"        if (run->numbers && {condition_text(whole.spares_links)}) continue;\n"
+            "        for (int i = run->first; i < run->first + run->count; i++) {\n"
+            f"            {call_text.format(indent=' ' * 12)}        }}\n    }}\n"
+        )
+    else:
+        count = f"model->{_SUBJECT_COUNTS[whole.subject]}"
+        first = _FIRST_INDICES.get(whole.subject, "0")
+        order, ahead = f"int i = {first}; i < {count}; i++", "MSTMM_TILE"
+        if whole.order == TIPS_TO_ROOT:
+            order, ahead = f"int i = {count} - 1; i >= {first}; i--", "-MSTMM_TILE"
+        fetches = prefetch_function(whole.name, [whole])
+        prefetch_text = f"        {_prefetch_call(whole.name, ahead)}" if fetches else ""
+        text = (
+            f"    for ({order}) {{\n{prefetch_text}        {call_text.format(indent=' ' * 8)}  "
+            f"  }}\n"
+        )
+    head = f"static int mstmm_pass_{whole.name}(mstmm_state *state)\n{{\n"
+    body = f"    const mstmm_model *model = state->model;\n{text}    return 0;\n"
+    return f"{fetches}{head}{body}}}\n"
+
+
+def _subject_call(whole: Pass, declared: str = "const int ") -> str:
+    """C call of a pass for subject i, which returns failures."""
+    given_arguments = "".join(f", {_given_pointer(slot)}" for slot in whole.given)
+    return (
+        f"{declared}code = mstmm_at_{whole.name}(state, i{given_arguments});\n"
+        "{indent}if (code) return code;\n"
+    )
+
+
+def _given_pointer(slot: str) -> str:
+    """C pointer to the usual storage of a slot that the caller passes."""
+    _, _, name = slot.partition(".")
+    block = "mstmm_block(model, state->workspace, model->bodies[i].parent)"
+    return f"{block} + MSTMM_BLOCK_{name.upper()}"
+
+
+def _prefetch_call(name: str, ahead: str) -> str:
+    return f"if (mstmm_beyond_cache(model)) mstmm_fetch_{name}(state, i, {ahead});\n"
+
+
+def _law_prefetch_call(ahead: str) -> str:
+    return f"if (mstmm_beyond_cache(model)) mstmm_fetch_law(model, i, {ahead});\n"
+
+
+def _tiled_function(group: TiledRun) -> str:
+    """C function that starts and sweeps bodies tile by tile."""
+    starting_passes = [run.whole for run in group.begun if run.whole is not None and not run.when]
+    has_laws = any(run.whole is not None and run.whole.subject == "law" for run in group.begun)
+    name = f"{group.swept.name}_tile"
+    prefetch_text = _prefetch_call(name, "-MSTMM_TILE")
+    laws = ", law = model->n_laws" if has_laws else ""
+    call_text = _subject_call(group.swept, "").format(indent=" " * 12)
+    return (
+        f"{prefetch_function(name, [*starting_passes, group.swept])}"
+        f"static int {group.function}(mstmm_state *state)\n{{\n"
+        "    const mstmm_model *model = state->model;\n"
+        f"    int code, begun = model->n_bodies{laws};\n"
+        "    for (int end = begun; end > 0; end -= MSTMM_TILE) {\n"
+        "        const int first = end > MSTMM_TILE ? end - MSTMM_TILE : 0;\n"
+        "        const int least = mstmm_least_parent(model, first, end);\n"
+        f"{_LAW_RANGE if has_laws else ''}{''.join(map(_tile_start_loop, group.begun))}"
+        "        if (least < begun) begun = least;\n"
+        "        for (int i = end - 1; i >= first; i--) {\n"
+        f"            {prefetch_text}            {call_text}"
+        "        }\n    }\n    return 0;\n}\n"
+    )
+
+
+def _chained_function(group: ChainedPasses) -> str:
+    """C function that runs several passes on each tile of bodies, root to tips."""
+    subjects = {sweep_pass.subject for sweep_pass in group.passes}
+    counters = "".join(
+        f", {subject_row[0]} = 0"
+        for name, subject_row in _ORDERED_SUBJECTS.items()
+        if name in subjects
+    )
+    name = f"{group.name}_chain"
+    fetches = prefetch_function(name, group.passes)
+    lines = []
+    for sweep_pass in group.passes:
+        call_text = _subject_call(sweep_pass, "").format(indent=" " * 12)
+        if sweep_pass.subject in _ORDERED_SUBJECTS:
+            lines.append(_ordered_subject_loop(sweep_pass, call_text))
+            continue
+        has_prefetch = sweep_pass is group.main and fetches
+        prefetch_text = f"            {_prefetch_call(name, 'MSTMM_TILE')}" if has_prefetch else ""
+        lines.append(
+            f"        for (int i = first; i < end; i++) {{\n{prefetch_text}            "
+            f"{call_text}        }}\n"
+        )
+    return (
+        f"{fetches}"
+        f"static int {group.function}(mstmm_state *state)\n{{\n"
+        "    const mstmm_model *model = state->model;\n"
+        f"    int code{counters};\n"
+        "    for (int first = 0; first < model->n_bodies; first += MSTMM_TILE) {\n"
+        "        const int end = mstmm_end_of_tile(model, first);\n"
+        f"{''.join(lines)}    }}\n    return 0;\n}}\n"
+    )
+
+
+def _ordered_subject_loop(whole: Pass, at: str) -> str:
+    """C loop of a pass over the subjects of a tile that are in the order of its bodies."""
+    counter, count, last_body = _ORDERED_SUBJECTS[whole.subject]
+    prefetch_text = (
+        f"            {_law_prefetch_call('MSTMM_TILE')}" if whole.subject == "law" else ""
+    )
+    return (
+        f"        for (; {counter} < model->{count} && {last_body} < end; {counter}++) {{\n"
+        f"            const int i = {counter};\n{prefetch_text}            {at}        }}\n"
+    )
+
+
+def _tile_start_loop(run: Run) -> str:
+    """C loop of a pass over the bodies of a tile that are not started yet."""
+    assert run.whole is not None
+    indent = " " * 8
+    opening, closing = "", ""
+    if run.when:
+        opening, closing = f"{indent}if ({condition_text(run.when)}) {{\n", f"{indent}}}\n"
+        indent += "    "
+    call_text = _subject_call(run.whole, "").format(indent=indent + "    ")
+    if run.whole.subject == "law":
+        text = f"{indent}for (int i = law; i < behind; i++) {{\n"
+        text += f"{indent}    {_law_prefetch_call('-MSTMM_TILE')}"
+    else:
+        text = f"{indent}for (int i = begun - 1; i >= least; i--) {{\n"
+    return f"{opening}{text}{indent}    {call_text}{indent}}}\n{closing}"
+
+
+def _sweep_function(sweep: Sweep, parts: list[Run | TiledRun | ChainedPasses]) -> str:
+    """C function that runs the passes of a sweep in order."""
+    lines = ["    int code;"]
+    for part in parts:
+        if isinstance(part, Run):
+            lines += _pass_call(part, "    ")
+            continue
+        tiles = [f"code = {part.function}(state);", "if (code) return code;"]
+        if not part.hindrances:
+            lines += [f"    {line}" for line in tiles]
+            continue
+        inside = [line for run in part.runs for line in _pass_call(run, " " * 8)]
+        lines += [f"    if ({part.singly}) {{", *inside, "    } else {"]
+        lines += [*(f"        {line}" for line in tiles), "    }"]
+    if any("model->" in line.replace("state->model->", "") for line in lines):
+        lines.insert(0, "    const mstmm_model *model = state->model;")
+    body = "\n".join([*lines, "    return 0;"])
+    head = f"/* {sweep.purpose} */\nint mstmm_run_{sweep.name}(mstmm_state *state)"
+    return f"{head}\n{{\n{body}\n}}\n"
+
+
+def _pass_call(run: Run, indent: str) -> list[str]:
+    """C lines that run a pass over all its subjects, under its condition."""
+    function_name = f"mstmm_pass_{run.whole.name}" if run.whole else f"mstmm_hook_{run.hook}"
+    lines = [f"code = {function_name}(state);", "if (code) return code;"]
+    if run.when:
+        lines = [f"if ({condition_text(run.when)}) {{", *(f"    {line}" for line in lines), "}"]
+    return [f"{indent}{line}" for line in lines]

@@ -1,0 +1,145 @@
+"""Straight-line KernelIR as C statements, for one number or for several lanes at a time.
+
+A kernel without run-time size becomes one `const` per value, in an order in which every value
+follows its operands.  The same lines are printed in several dialects: plain numbers of any
+real type, and GNU C vectors, whose operations are spelled as functions of the support text
+(templates/fused_*.c).  Ports get an underscore behind their names, so that they clash with no
+other name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from mstmm.ir import OPERATIONS, Assign, Constant, Guard, KernelIR, Operand, Port, Store, Temporary
+
+from ..fuse.optimisation.statement_units import operands
+from .kernel_text import literal_text
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How C spells values: their types in registers and in arrays, truths, prefix of functions."""
+
+    real: str
+    array: str
+    truth: str
+    prefix: str
+    vector: bool = False
+
+
+#: One number at a time, of the type `real` of the text around it.
+SCALAR_DIALECT = Dialect("real", "real", "int", "real_")
+#: Several numbers at a time, one per lane.
+LANE_DIALECT = Dialect("lanes_t", "lanes_array_t", "mask_t", "lanes_", vector=True)
+
+
+def port_array_name(name: str) -> str:
+    """C name of a port's array."""
+    return f"{name}_"
+
+
+def parameter_list(kernel: KernelIR, dialect: Dialect) -> list[str]:
+    """C parameters of a kernel's function: inputs, then outputs, in the order of the ports."""
+    inputs = [f"const {dialect.array} *restrict {port_array_name(p.name)}" for p in kernel.inputs]
+    return inputs + [f"{dialect.array} *restrict {port_array_name(p.name)}" for p in kernel.outputs]
+
+
+class StraightText:
+    """C text of the statements of one straight-line kernel."""
+
+    def __init__(self, kernel: KernelIR, dialect: Dialect) -> None:
+        if kernel.size_symbol is not None:
+            raise ValueError(f"{kernel.name}: a kernel of run-time size is no straight line")
+        self.kernel, self.dialect = kernel, dialect
+        self.ports: dict[str, Port] = {p.name: p for p in (*kernel.inputs, *kernel.outputs)}
+        #: Temporaries that are truth values.
+        self.truths = {
+            s.number for s in kernel.statements if isinstance(s, Assign) and OPERATIONS[s.op].truth
+        }
+        self._numbers = _used_as_numbers(kernel.statements) & self.truths
+
+    def assign(self, statement: Assign) -> list[str]:
+        """`const real t12 = ...;`; a truth value is `m12`, also `t12` if it is used as a number."""
+        number, op, args = statement.number, statement.op, statement.args
+        if not OPERATIONS[op].truth:
+            return [f"const {self.dialect.real} t{number} = {self._value(op, args)};"]
+        truth = f"const {self.dialect.truth} m{number} = {self._comparison(op, args)};"
+        return [truth, *self.counted(number)]
+
+    def counted(self, number: int) -> list[str]:
+        """C lines that convert a truth value to a number, if any part uses it as such."""
+        if number not in self._numbers:
+            return []
+        value = f"{self.dialect.prefix}number(m{number})"
+        return [f"const {self.dialect.real} t{number} = {value}; (void)t{number};"]
+
+    def store(self, statement: Store) -> str:
+        """`qdot_[3] = t12;`, or += where the port accumulates."""
+        port = self.ports[statement.port]
+        sign = "+=" if port.accumulate else "="
+        offset = port.offset(statement.index)
+        return f"{port_array_name(port.name)}[{offset}] {sign} {self.whole(statement.value)};"
+
+    def truth(self, operand: Operand) -> str:
+        """Whether an operand is true, that is, neither zero nor NaN."""
+        if isinstance(operand, Temporary) and operand.number in self.truths:
+            return f"m{operand.number}"
+        return f"{self.dialect.prefix}true({self.whole(operand)})"
+
+    def word(self, operand: Operand) -> str:
+        """Operand of an arithmetic operator: a literal, an entry of a port or a temporary."""
+        if isinstance(operand, Constant):
+            return literal_text(operand.text)
+        if isinstance(operand, Temporary):
+            return f"t{operand.number}"
+        return f"{port_array_name(operand.port)}[{self.ports[operand.port].offset(operand.index)}]"
+
+    def whole(self, operand: Operand) -> str:
+        """An operand of the dialect's own type: a literal fills every lane."""
+        text = self.word(operand)
+        return f"lanes_all({text})" if self._bare(operand) else text
+
+    def _bare(self, operand: Operand) -> bool:
+        return self.dialect.vector and isinstance(operand, Constant)
+
+    def _value(self, op: str, args: Sequence[Operand]) -> str:
+        row = OPERATIONS[op]
+        if row.sign:
+            left_text = self.whole(args[0]) if self._bare(args[1]) else self.word(args[0])
+            return f"{left_text} {row.sign} {self.word(args[1])}"
+        if op == "neg":
+            return f"-{self.whole(args[0])}"
+        condition_count = row.conditions
+        operand_texts = [
+            *map(self.truth, args[:condition_count]),
+            *map(self.whole, args[condition_count:]),
+        ]
+        return f"{self.dialect.prefix}{op}({', '.join(operand_texts)})"
+
+    def _comparison(self, op: str, args: Sequence[Operand]) -> str:
+        row = OPERATIONS[op]
+        if row.conditions:  # & and |: the order does not matter, and && does not accept vectors
+            return f"{self.truth(args[0])} {row.sign[0]} {self.truth(args[1])}"
+        if row.sign:
+            return f"{self.whole(args[0])} {row.sign} {self.whole(args[1])}"
+        (a,) = args
+        if isinstance(a, Temporary) and a.number in self.truths:
+            return f"{self.dialect.prefix}not(m{a.number})"
+        return f"{self.whole(a)} == {self.whole(Constant('0'))}"
+
+
+def _used_as_numbers(statements: Iterable[object]) -> set[int]:
+    """Temporaries that are used as numbers, not as truth values."""
+    numbers: set[int] = set()
+    for statement in statements:
+        operands_read = operands(statement)
+        if isinstance(statement, Guard):
+            continue
+        if isinstance(statement, Assign) and statement.op == "not":
+            continue
+        if isinstance(statement, Assign):
+            operands_read = operands_read[OPERATIONS[statement.op].conditions :]
+        numbers |= {operand.number for operand in operands_read if isinstance(operand, Temporary)}
+    return numbers

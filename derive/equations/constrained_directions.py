@@ -1,0 +1,97 @@
+"""What a hinge holds: the directions that its motion subspace leaves over.
+
+Of the six directions between the two sides of a hinge, H spans those along which it lets go.  Rows
+
+    W = [H^+; N^T],  H^+ = (H^T H)^-1 H^T,  N^T H = 0,  N^T N = 1
+
+tell of a relative motion how fast the hinge's own speeds go, and behind them what the hinge holds.
+N stands on reflections that take the columns of H to coordinate directions one by one (Householder,
+J. ACM 5 (1958) 339-342), so that axes along coordinates leave coordinate directions.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..definition.derivation import Derivation, Equation, Quantity, Solve
+from .block_matrices import symbol
+
+SOURCES = ("Householder, J. ACM 5 (1958) 339-342 (reflections)",)
+
+#: Rows of W, one below the other: each is a load along which the hinge moves or holds.
+DIRECTIONS = Quantity(symbol("W", 6, 6), "", "rows: H^+, then what the hinge holds")
+
+
+def complement(nu: int) -> Derivation:
+    """W of a hinge with nu speeds."""
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    equations: list[Equation] = []
+    reflected: sp.Basic = h.symbol
+    mirrors: list[tuple[sp.MatrixSymbol, sp.MatrixSymbol]] = []
+    for k in range(nu):
+        mirror, more = _mirror(k, reflected)
+        equations += more
+        mirrors.append(mirror)
+        if k + 1 < nu:
+            onward = symbol(f"H_{k + 1}", 6, nu)
+            equations.append(
+                Equation(f"H, reflected {k + 1} times", onward, _reflected(mirror, reflected))
+            )
+            reflected = onward
+    held: sp.Basic = sp.ImmutableDenseMatrix(6, 6 - nu, lambda i, j: sp.Integer(i == j + nu))
+    for k in reversed(range(nu)):
+        onward = symbol(f"N_{k + 1}", 6, 6 - nu)
+        if nu < 6:
+            equations.append(
+                Equation(f"N, behind mirror {k + 1}", onward, _reflected(mirrors[k], held))
+            )
+            held = onward
+    rows: list[list[sp.Expr]] = []
+    if nu:
+        gram, inverse = symbol("HH", nu, nu), symbol("H_inv", nu, 6)
+        equations += [
+            Equation("H^T H", gram, h.symbol.T * h.symbol),
+            Equation("H^+", inverse, Solve(gram, h.symbol.T, symmetric=True)),
+        ]
+        rows += [[inverse[k, i] for i in range(6)] for k in range(nu)]
+    rows += [[held[i, j] for i in range(6)] for j in range(6 - nu)]
+    equations.append(Equation("W", DIRECTIONS.symbol, sp.ImmutableDenseMatrix(rows)))
+    return Derivation(
+        f"generic{nu}",
+        f"what a hinge with {nu} speeds lets go and holds",
+        (h,),
+        (DIRECTIONS,),
+        tuple(equations),
+        sources=SOURCES,
+    )
+
+
+def _mirror(
+    k: int, matrix: sp.Basic
+) -> tuple[tuple[sp.MatrixSymbol, sp.MatrixSymbol], list[Equation]]:
+    """v and b of the reflection 1 - b v v^T that leaves of column k what is along direction k."""
+    size, v, b = symbol(f"size_{k + 1}", 1), symbol(f"v_{k + 1}", 6), symbol(f"b_{k + 1}", 1)
+    length, first = size[0, 0], matrix[k, k]
+    away = first + sp.Piecewise((-length, first < 0), (length, True))
+    entries = [*[sp.Integer(0)] * k, away, *(matrix[i, k] for i in range(k + 1, 6))]
+    share = length * (length + sp.Abs(first))
+    return (v, b), [
+        Equation(
+            f"length of column {k + 1}", size,
+            sp.ImmutableDenseMatrix([sp.sqrt(sum(matrix[i, k] ** 2 for i in range(k, 6)))]),
+        ),
+        Equation(f"mirror {k + 1}", v, sp.ImmutableDenseMatrix(entries)),
+        Equation(
+            f"2 / v^T v of mirror {k + 1}", b,
+            sp.ImmutableDenseMatrix([sp.Piecewise((1 / share, share > 0), (0, True))]),
+        ),
+    ]  # fmt: skip
+
+
+def _reflected(mirror: tuple[sp.MatrixSymbol, sp.MatrixSymbol], matrix: sp.Basic) -> sp.Basic:
+    v, b = mirror
+    rows, columns = (int(extent) for extent in matrix.shape)
+    along = [sum(v[i, 0] * matrix[i, j] for i in range(rows)) for j in range(columns)]
+    return sp.ImmutableDenseMatrix(
+        rows, columns, lambda i, j: matrix[i, j] - b[0, 0] * v[i, 0] * along[j]
+    )

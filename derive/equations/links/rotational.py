@@ -1,0 +1,177 @@
+"""A rigid body behind a hinge that turns about a point, in four kernels for the looped engine.
+
+The link of a ball hinge.  Its speeds are given in the body's axes, so that these are not for
+choosing and the way from the parent is any rotation and place, Rt and ro of `sweep`:
+
+    turn       rotation to the parent, from the coordinates
+    forward    bias motion of the body and the load that it needs
+    condense   own inertia and what hangs on the body; elimination; transport to the parent
+    recover    accelerations
+
+The ports are those of a link along and about z (`axial`), and they mean the same: what the hinge's
+coordinates say of the way to the parent is `turn`, and of G and g stands what the factored
+elimination leaves to be done (`factored`).
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ...definition.derivation import Derivation, Equation, Quantity, Triangular, tilde
+from ...definition.element import Body, Hinge
+from .. import user_body as body_kernels
+from ..block_matrices import part, stack, symbol
+from ..hinge import HingeMotion, hinge_quantities, moves_as, place_of
+from ..hinge_elimination import REDUCED_E
+from ..ldl_elimination import eliminate_factored
+from ..riccati_sweep import (
+    DELTA,
+    MOTION,
+    PARENT_DELTA,
+    PARENT_MOTION,
+    SHIFT,
+    SOURCES,
+    E,
+    R,
+    S,
+    congruence,
+    outboard_deviation,
+    transport,
+)
+from ..screw_transport import OUT_E, OUT_S
+from .axial import BODY, OUTER_E, OUTER_S, OWN_LOAD, body_motion, of_body
+
+LINK = Quantity(
+    symbol("link", 12), "", "rotation, inboard hinge axes to parent axes; inboard point (m)"
+)
+TURN = Quantity(symbol("turn", 3, 3), "", "rotation, body axes to parent axes")
+#: Along an axis there is a shift; about a point there is none.
+NO_SHIFT = Quantity(symbol("d", 0), "m", "shift")
+
+
+def turns_about_a_point(hinge: Hinge) -> bool:
+    """Whether a hinge leaves its point where it is, and its speeds are the relative angular
+    velocity in the body's axes, which is the rate of no coordinates."""
+    if hinge.speeds is None or place_of(hinge).position.is_zero_matrix is not True:
+        return False
+    turning = sp.Matrix.vstack(sp.zeros(3, 3), sp.eye(3))
+    return moves_as(hinge, turning)
+
+
+def _way() -> tuple[Equation, Equation]:
+    """The way to the parent under the names of the sweep's equations."""
+    return (
+        Equation("rotation to the parent", R.symbol, TURN.symbol),
+        Equation("lever in the parent", SHIFT.symbol, part(LINK.symbol, 9)),
+    )
+
+
+def turn(motion: HingeMotion) -> Derivation:
+    """Rotation to the parent."""
+    inboard = sp.ImmutableDenseMatrix(3, 3, lambda i, j: LINK.symbol[3 * i + j, 0])
+    value = inboard * motion.in_arrays(motion.rotation)
+    return Derivation(
+        motion.hinge.name,
+        f"rotation of the {motion.hinge.title}",
+        (LINK, *hinge_quantities(motion.hinge)[1:2]),
+        (TURN,),
+        (Equation("rotation to the parent", TURN.symbol, value),),
+    )
+
+
+def forward(motion: HingeMotion, body: Body) -> Derivation:
+    """Bias motion of the body, and the load that this motion needs."""
+    rest, rates = symbol("motion_Q", 9), symbol("qdot", motion.rates.rows)
+    w, wd, rdd = (part(PARENT_MOTION.symbol, n) for n in (0, 3, 6))
+    carrier, back = symbol("K", 3, 3), R.symbol.T
+    lever = part(SHIFT.symbol, 0)
+    return Derivation(
+        motion.hinge.name,
+        f"bias motion of a rigid body behind the {motion.hinge.title}",
+        (LINK, TURN, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
+        (NO_SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
+        (
+            *_way(),
+            Equation("no shift", NO_SHIFT.symbol, sp.ImmutableDenseMatrix(sp.zeros(0, 1))),
+            Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
+            Equation(
+                "bias motion before the hinge",
+                rest,
+                stack(back * w, back * wd, back * (rdd + carrier * lever)),
+            ),
+            Equation("bias motion", MOTION.symbol, body_motion(motion, rest)),
+            Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
+            Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
+        ),
+        sources=SOURCES,
+    )
+
+
+def _gains(nu: int) -> tuple[Quantity, Quantity]:
+    return (
+        Quantity(symbol("G", nu, 6), "", "Z along forces, then F of D = L diag(d) L^T"),
+        Quantity(symbol("g", nu), "", "diag(d)^-1 L^-1 (tau - H^T e)"),
+    )
+
+
+def condense(motion: HingeMotion, body: Body) -> Derivation:
+    """S and e of the body and all behind it at the parent's P, parent's axes."""
+    nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
+    inputs = hinge_quantities(motion.hinge)[:1]
+    elimination = eliminate_factored(nu, subspace, inputs)
+    tau = next(q for q in elimination.inputs if q.name == "tau")
+    gain, offset = _gains(nu)
+    factor, left = symbol("F", nu, nu), symbol("Z", nu, 6)
+    kept = sp.ImmutableDenseMatrix(nu, 6, lambda i, j: left[i, j] if j < 3 else factor[i, j - 3])
+    mass = of_body(body_kernels.inertia(body), "S")
+    steps, carried = congruence("S_Q")
+    return Derivation(
+        motion.hinge.name,
+        f"S and e of a rigid body carried across the {motion.hinge.title}",
+        (LINK, TURN, NO_SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
+        (gain, offset, OUT_S, OUT_E),
+        (
+            *_way(),
+            Equation(
+                "S of body and outboard part", S.symbol, mass + OUTER_S.symbol, symmetric=True
+            ),
+            Equation("e of body and outboard part", E.symbol, OWN_LOAD.symbol + OUTER_E.symbol),
+            *elimination.definitions,
+            Equation("Z along forces, and F", gain.symbol, kept),
+            Equation("diag(d)^-1 y", offset.symbol, symbol("z", nu)),
+            *steps,
+            Equation("X^T S_Q X", OUT_S.symbol, carried),
+            Equation("X^T e_Q", OUT_E.symbol, transport(REDUCED_E.symbol)),
+        ),
+        sources=SOURCES,
+    )
+
+
+def recover(motion: HingeMotion) -> Derivation:
+    """udot = v - X delta_I about the axes, v = L^-T (z - Z X delta_I) along them; the body's own
+    deviation X delta_I + H udot, which about the axes is v."""
+    nu = motion.nu
+    gain, offset = _gains(nu)
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
+    carried, factor, v = symbol("delta_Q", 6), symbol("F", nu, nu), symbol("v", nu)
+    along = sp.ImmutableDenseMatrix(nu, 3, lambda i, j: gain.symbol[i, j])
+    kept = sp.ImmutableDenseMatrix(nu, nu, lambda i, j: gain.symbol[i, 3 + j])
+    return Derivation(
+        motion.hinge.name,
+        f"accelerations of a rigid body behind the {motion.hinge.title}",
+        (LINK, TURN, NO_SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
+        (rates, DELTA),
+        (
+            *_way(),
+            Equation("X delta_I", carried, outboard_deviation()),
+            Equation("F", factor, kept),
+            Equation(
+                "v = L^-T (z - Z X delta_I)",
+                v,
+                Triangular(factor, offset.symbol - along * part(carried, 0), transposed=True),
+            ),
+            Equation("udot = v - W X delta_I", rates.symbol, v - part(carried, 3)),
+            Equation("deviation of the body", DELTA.symbol, stack(part(carried, 0), v)),
+        ),
+        sources=SOURCES,
+    )

@@ -1,0 +1,326 @@
+"""The sweep as least squares: S as U^T U, carried from tips to root by rotations of rows.
+
+But for efforts, the accelerations are those that make the sum of the squares of rows smallest
+(Gauss, J. reine angew. Math. 4 (1829) 232-235).  A body's rows are a factor of its mass matrix, and
+all that hangs on a body has rows as well:
+
+    f = U^T (U a + d) + e,   S = U^T U
+
+with U upper triangular, d the load that rows can take (all of it where U is regular, as is that of
+a body with inertia of its own), and e the rest.  Across a hinge a = a_Q + H udot, and rotations
+make of the rows, with the rotors' own below them,
+
+    [U H       U  d]       [R_u  R_a  d_u]
+    [sqrt(J)   0  0]  ->   [0    V    d_V]
+
+so that D = R_u^T R_u, G = R_u^-1 R_a, and V, d_V are what travels on: S_Q = V^T V, without the
+difference S - U G of the Riccati sweep, in which the inertia of a heavy tip is taken off digit by
+digit until that of light links is left (Golub, Van Loan, Matrix Computations, 5.3, on rows against
+normal equations).
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..definition.derivation import Derivation, Equation, Quantity, Triangle, Triangular, tilde
+from .block_matrices import column, part, stack, symbol
+from .riccati_sweep import (
+    FLOOR,
+    MOTION,
+    PARENT_E,
+    SHIFT,
+    SOURCES,
+    E,
+    R,
+    S,
+    free_speeds,
+    gains,
+    pivot_guards,
+    transport,
+)
+
+#: A pivot of a mass matrix is at least this share of its diagonal entry: below is rounding.
+_ROUNDING = sp.Rational(1, 10**15)
+#: A load is taken by rows whose diagonal entry exceeds this share of its column.
+_TAKEN = sp.Rational(1, 10**13)
+#: Least share of a column of U H, squared, that columns before it must leave of it.
+_INDEPENDENT = sp.Rational(1, 10**26)
+
+SOURCES_QR = (
+    *SOURCES,
+    "Gauss, J. reine angew. Math. 4 (1829) 232-235 (least constraint)",
+    "Golub, Van Loan, Matrix Computations, 4th ed., 5.1-5.3 (rotations, least squares)",
+)
+
+ROWS = Quantity(symbol("U", 21), "", "upper triangle, row by row: S = U^T U")
+TAKEN = Quantity(symbol("d", 6), "", "load that rows take: f = U^T (U a + d) + e")
+ONWARD = Quantity(symbol("V", 21), "", "upper triangle of what is behind the hinge")
+ONWARD_TAKEN = Quantity(symbol("d_V", 6), "", "load that its rows take")
+REST = Quantity(symbol("e_Q", 6), "N, N*m", "load that they do not take")
+
+PARENT_ROWS = Quantity(symbol("U_P", 21), "", "upper triangle of the parent so far")
+PARENT_TAKEN = Quantity(symbol("d_P", 6), "", "load that its rows take")
+
+
+def triangular(numbers: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+    """The upper triangular matrix whose 21 numbers these are, row by row."""
+    return sp.ImmutableDenseMatrix(
+        6, 6, lambda i, j: numbers[6 * i - i * (i + 1) // 2 + j, 0] if j >= i else sp.Integer(0)
+    )
+
+
+def _numbers(matrix: sp.Basic) -> sp.ImmutableDenseMatrix:
+    """The opposite: the upper triangle of a 6 x 6 matrix as a column."""
+    return sp.ImmutableDenseMatrix([matrix[i, j] for i in range(6) for j in range(i, 6)])
+
+
+def _scalar(name: str, value: sp.Expr, said: str) -> tuple[sp.Expr, Equation]:
+    found = symbol(name, 1, 1)
+    return found[0, 0], Equation(said, found, sp.ImmutableDenseMatrix([[value]]))
+
+
+def factor() -> Derivation:
+    """U of a body alone: S = U^T U (Cholesky), for a mass matrix that may be singular."""
+    equations: list[Equation] = []
+    entries: list[list[sp.Expr]] = []
+    for i in range(6):
+        left = S.symbol[i, i] - sum(row[i] ** 2 for row in entries)
+        least = _ROUNDING * S.symbol[i, i]
+        root, rooted = _scalar(f"root_{i + 1}", sp.sqrt(sp.Max(left, least)), f"U_{i + 1}{i + 1}")
+        share, shared = _scalar(
+            f"share_{i + 1}", sp.Piecewise((1 / root, root > 0), (0, True)), f"1 / U_{i + 1}{i + 1}"
+        )
+        behind = [
+            (S.symbol[i, j] - sum(row[i] * row[j] for row in entries)) * share
+            for j in range(i + 1, 6)
+        ]
+        row = symbol(f"row_{i + 1}", 1, 6)
+        values = [*[sp.Integer(0)] * i, root, *behind]
+        equations += [
+            rooted, shared, Equation(f"row {i + 1}", row, sp.ImmutableDenseMatrix([values]))
+        ]  # fmt: skip
+        entries.append([row[0, j] for j in range(6)])
+    whole = sp.ImmutableDenseMatrix(entries)
+    equations.append(Equation("U", ROWS.symbol, _numbers(whole)))
+    return Derivation(
+        "qr", "rows of a body alone", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
+    )
+
+
+def bias() -> Derivation:
+    """d and e of a rigid body alone, by its rows instead of by its load.
+
+    Its load e_B = S [rdd + w x (w x r_C); wd] + [0; w x J_C w] is a difference of what a long arm
+    r_C makes large where the inertia J_C about the mass centre counts; its rows are sqrt(m) times
+    the acceleration of the centre, and U_a times the angular one, J_C = U_a^T U_a.
+    """
+    u, motion = triangular(ROWS.symbol), MOTION.symbol
+    w, wd, rdd = (part(motion, k) for k in (0, 3, 6))
+    arm = sp.ImmutableDenseMatrix([u[1, 5], -u[0, 5], u[0, 4]])
+    inner = sp.ImmutableDenseMatrix(3, 3, lambda i, j: u[3 + i, 3 + j])
+    accelerations, turning = symbol("a_B", 6), symbol("b", 6)
+    own, spun = symbol("U_a", 3, 3), symbol("h", 3)
+    spin = tilde(w)
+    return Derivation(
+        "qr",
+        "loads of a rigid body alone by its rows",
+        (ROWS, MOTION),
+        (TAKEN, E),
+        (
+            Equation("bias acceleration", accelerations, stack(rdd, wd)),
+            Equation("w x (w x r_C) sqrt(m)", turning, stack(spin * (spin * arm), sp.zeros(3, 1))),
+            Equation("d", TAKEN.symbol, u * accelerations + turning),
+            Equation("rows of J_C", own, inner),
+            Equation("J_C w", spun, own.T * (own * w)),
+            Equation("w x J_C w", E.symbol, stack(sp.zeros(3, 1), spin * spun)),
+        ),
+        sources=SOURCES_QR,
+    )
+
+
+def _load_taken() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbol]:
+    """d + U^-T e, row by row, and what is left of e where rows are too small to take it."""
+    u, equations = triangular(ROWS.symbol), []
+    taken: list[sp.Expr] = []
+    rest: list[sp.Expr] = []
+    for i in range(6):
+        left, equation = _scalar(
+            f"left_{i + 1}", E.symbol[i, 0] - sum(u[k, i] * taken[k] for k in range(i)),
+            f"load left for row {i + 1}",
+        )  # fmt: skip
+        size = sum(u[k, i] ** 2 for k in range(i + 1))
+        takes = u[i, i] ** 2 > _TAKEN**2 * size
+        added, adding = _scalar(
+            f"taken_{i + 1}", sp.Piecewise((left / u[i, i], takes), (0, True)), f"row {i + 1} takes"
+        )
+        kept, keeping = _scalar(
+            f"rest_{i + 1}", sp.Piecewise((0, takes), (left, True)), f"row {i + 1} leaves"
+        )
+        equations += [equation, adding, keeping]
+        taken.append(added)
+        rest.append(kept)
+    whole, remaining = symbol("d_all", 6), symbol("e_rest", 6)
+    total = [TAKEN.symbol[i, 0] + taken[i] for i in range(6)]
+    equations += [
+        Equation("d + U^-T e", whole, sp.ImmutableDenseMatrix(total)),
+        Equation("what is left of e", remaining, sp.ImmutableDenseMatrix(rest)),
+    ]
+    return tuple(equations), whole, remaining
+
+
+def qr_eliminate(nu: int) -> Derivation:
+    """G and g of a hinge, and the rows and loads behind it.
+
+    udot = g - G a_Q with g = R_u^-1 (R_u^-T (tau - H^T e) - d_u); of the load that no row takes
+    e_Q = e + G^T (tau - H^T e) goes on.
+    """
+    h = Quantity(_subspace(nu), "", "motion subspace of the free coordinates")
+    rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
+    gain, offset = gains(nu)
+    equations, load, rest = _load_taken()
+    rows, pivots = _rotated(nu), _pivots(nu)
+    u, pushed, surplus = triangular(ROWS.symbol), symbol("UH", 6, nu), symbol("surplus", nu)
+    stacked: sp.Basic = sp.BlockMatrix([[u, load]])
+    if nu:
+        rotors = sp.ImmutableDenseMatrix(sp.diag(*[sp.sqrt(x) for x in column(rotor.symbol)]))
+        stacked = sp.BlockMatrix([[pushed, u, load], [rotors, sp.zeros(nu, 6), sp.zeros(nu, 1)]])
+        squares = [sum(pushed[i, k] ** 2 for i in range(6)) + rotor.symbol[k, 0] for k in range(nu)]
+        equations += (
+            Equation("U H", pushed, u * h.symbol),
+            Equation("diagonal of D", pivots, sp.ImmutableDenseMatrix(squares)),
+            Equation("tau - H^T e", surplus, tau.symbol - h.symbol.T * rest),
+        )
+    equations += (Equation("rotated rows", rows, Triangle(stacked, nu + 6)),)
+    if nu:
+        equations += (
+            *_answers(nu, rows, surplus),
+            Equation("e_Q = e + G^T (tau - H^T e)", REST.symbol, rest + gain.symbol.T * surplus),
+        )
+    else:
+        equations += (Equation("e_Q = e", REST.symbol, rest),)
+    behind = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[nu + i, nu + j])
+    onward = sp.ImmutableDenseMatrix([rows[nu + i, nu + 6] for i in range(6)])
+    equations += (
+        Equation("V", ONWARD.symbol, _numbers(behind)),
+        Equation("d_V", ONWARD_TAKEN.symbol, onward),
+    )
+    return Derivation(
+        f"generic{nu}",
+        f"rows behind a hinge with {free_speeds(nu)}",
+        (h, rotor, FLOOR, ROWS, TAKEN, E, tau),
+        (gain, offset, ONWARD, ONWARD_TAKEN, REST),
+        equations,
+        sources=SOURCES_QR,
+    )
+
+
+def _subspace(nu: int) -> sp.MatrixSymbol:
+    return symbol("H", 6, nu)
+
+
+def _rotated(nu: int) -> sp.MatrixSymbol:
+    return symbol("R", nu + 6, nu + 7)
+
+
+def _pivots(nu: int) -> sp.MatrixSymbol:
+    return symbol("D_ii", nu)
+
+
+def _answers(nu: int, rows: sp.MatrixSymbol, surplus: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    """G and g by R_u = diag(R_ii) L^T, L with ones on its diagonal."""
+    gain, offset = gains(nu)
+    shares, lower = symbol("shares", nu), symbol("L", nu, nu)
+    below, left = symbol("y", nu), symbol("w", nu)
+    scaled = sp.ImmutableDenseMatrix(nu, 6, lambda k, j: shares[k, 0] * rows[k, nu + j])
+    pulled = [shares[k, 0] * (shares[k, 0] * below[k, 0] - rows[k, nu + 6]) for k in range(nu)]
+    return (
+        Equation("1 / R_ii", shares, sp.ImmutableDenseMatrix([1 / rows[k, k] for k in range(nu)])),
+        Equation(
+            "L", lower,
+            sp.ImmutableDenseMatrix(
+                nu, nu, lambda j, k: shares[k, 0] * rows[k, j] if j > k else sp.Integer(j == k)
+            ),
+        ),
+        Equation("G = R_u^-1 R_a", gain.symbol, Triangular(lower, scaled, transposed=True)),
+        Equation("L^-1 (tau - H^T e)", below, Triangular(lower, surplus)),
+        Equation("R_ii^-1 (R_u^-T (tau - H^T e) - d_u)", left, sp.ImmutableDenseMatrix(pulled)),
+        Equation("g", offset.symbol, Triangular(lower, left, transposed=True)),
+    )  # fmt: skip
+
+
+def qr_guards(nu: int) -> tuple[tuple[sp.Basic, int, str], ...]:
+    """Those of the other sweep on the diagonal of D, and what earlier columns leave of a column."""
+    u, rows, pivots = triangular(ROWS.symbol), _rotated(nu), _pivots(nu)
+    diagonal = sp.diag(*[sum(u[k, i] ** 2 for k in range(i + 1)) for i in range(6)])
+    independent = tuple(
+        (
+            rows[k, k] ** 2 > _INDEPENDENT * pivots[k, 0],
+            1,
+            f"pivot {k + 1} of {nu} vanishes: a motion of the hinge is undetermined",
+        )
+        for k in range(nu)
+    )
+    return (*pivot_guards(nu, pivots=column(pivots), whole=diagonal), *independent)
+
+
+def merge() -> Derivation:
+    """Rows behind a hinge added to those of the parent, the load that they do not take to its e.
+
+    A row V of the hinge is V X of the parent, X = [R^T  -R^T r~; 0  R^T]; rotations put both into
+    one triangle.
+    """
+    v, own = triangular(ONWARD.symbol), triangular(PARENT_ROWS.symbol)
+    turned, moved = symbol("V_a", 6, 3), symbol("V_r", 6, 3)
+    back = R.symbol.T
+    linear = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, j])
+    angular = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, 3 + j])
+    rows = symbol("R", 6, 7)
+    found = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[i, j])
+    return Derivation(
+        "qr",
+        "rows added to those of the parent",
+        (R, SHIFT, ONWARD, ONWARD_TAKEN, REST, PARENT_ROWS, PARENT_TAKEN),
+        (ROWS, TAKEN, PARENT_E),
+        (
+            Equation("V by accelerations at the parent", turned, linear * back),
+            Equation(
+                "V by its angular accelerations",
+                moved,
+                angular * back - turned * tilde(column(SHIFT.symbol)),
+            ),
+            Equation(
+                "rotated rows",
+                rows,
+                Triangle(
+                    sp.BlockMatrix(
+                        [[own, PARENT_TAKEN.symbol],
+                         [sp.BlockMatrix([[turned, moved]]), ONWARD_TAKEN.symbol]]
+                    ),
+                    6,
+                ),
+            ),
+            Equation("U", ROWS.symbol, _numbers(found)),
+            Equation("d", TAKEN.symbol, sp.ImmutableDenseMatrix([rows[i, 6] for i in range(6)])),
+            Equation("X^T e_Q", PARENT_E.symbol, transport(REST.symbol)),
+        ),
+        sources=SOURCES_QR,
+    )  # fmt: skip
+
+
+def restored() -> Derivation:
+    """S and e of the rows and loads, as whoever asks for the load at P reads them."""
+    u = triangular(ROWS.symbol)
+    e = Quantity(symbol("e_S", 6), "N, N*m", "force part of f = S a + e")
+    return Derivation(
+        "qr",
+        "S and e of rows",
+        (ROWS, TAKEN, E),
+        (S, e),
+        (
+            Equation("S = U^T U", S.symbol, u.T * u, symmetric=True),
+            Equation("U^T d + e", e.symbol, u.T * TAKEN.symbol + E.symbol),
+        ),
+        sources=SOURCES_QR,
+    )

@@ -1,0 +1,394 @@
+"""The Riccati sweep as matrix equations: absorb a body, pass a hinge, condense, recover.
+
+Between any two elements force and acceleration stand in the relation f = S a + e (Riccati form of
+the transfer relation, a = [linear; angular], f = [force; moment]).  Swept from the tips to the
+root S and e are known; swept back, every acceleration follows.  In the accelerations used here S
+is the articulated-body inertia.
+
+The equations are stated in deviations from a *bias motion*, the motion with prescribed hinge
+accelerations s (zero for free coordinates): delta a = a - a_bias.  Then velocity terms appear once,
+in the bias motion, and e starts from the inertia force of the bias motion.
+
+Frames: a body's axes are the outboard axes of its inboard hinge (origin at its input end P).  The
+inboard point Q of a hinge is given in its parent by Rt (Q axes to parent axes) and ro.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde
+from .block_matrices import column, diagonal, part, stack, symbol
+from .hinge import HingeMotion
+
+#: A pivot must exceed this share of the mean inertia of the body that it moves.
+PIVOT_FLOOR = sp.Rational(1, 10**14)
+
+SOURCES = (
+    "Rui, Bestle, Wang, Zhang, Rui, He, Multibody Syst. Dyn. 49 (2020) 337-354 (Riccati form)",
+    "Rui, Wang, Zhang, ch. 5, (5.20)-(5.27) (elements)",
+)
+
+
+def free_speeds(nu: int) -> str:
+    """How many coordinates are free, for a title."""
+    return f"{nu or 'no'} free speed{'' if nu == 1 else 's'}"
+
+
+# --- quantities shared by the steps -----------------------------------------------------------
+
+RT = Quantity(symbol("Rt", 3, 3), "", "rotation, inboard hinge axes to parent axes")
+RO = Quantity(symbol("ro", 3), "m", "inboard point Q in the parent, parent axes")
+PARENT_MOTION = Quantity(
+    symbol("motion_I", 9), "", "bias motion of the parent: w, wd, rdd of its P, parent axes"
+)
+MOTION = Quantity(symbol("motion", 9), "", "bias motion of the body: w, wd, rdd of its P, own axes")
+R = Quantity(symbol("Rc", 3, 3), "", "rotation, body axes to parent axes")
+SHIFT = Quantity(symbol("r", 3), "m", "P of the body from P of the parent, parent axes")
+S = Quantity(symbol("S", 6, 6), "", "f = S a + e of everything outboard, at P", symmetric=True)
+E = Quantity(symbol("e", 6), "N, N*m", "force part of f = S a + e, at P")
+PARENT_S = Quantity(
+    symbol("S_I", 6, 6), "", "contribution to the parent's S", symmetric=True, accumulate=True
+)
+PARENT_E = Quantity(symbol("e_I", 6), "N, N*m", "contribution to the parent's e", accumulate=True)
+PARENT_DELTA = Quantity(symbol("delta_I", 6), "", "deviation of the parent's acceleration")
+DELTA = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration, at P")
+
+
+FLOOR = Quantity(
+    symbol("floor", 2), "kg, kg*m2", "least inertia along and about an axis that is not rounding"
+)
+
+
+def gains(nu: int) -> tuple[Quantity, Quantity]:
+    """G and g of a hinge: udot = g - G a_Q."""
+    return (
+        Quantity(symbol("G", nu, 6), "", "udot = g - G a_Q"),
+        Quantity(symbol("g", nu), "", "udot = g - G a_Q"),
+    )
+
+
+def _bias_equations(
+    rotation: sp.Basic,
+    position: sp.Basic,
+    v: sp.Basic,
+    w: sp.Basic,
+    c: sp.Basic,
+    imposed: sp.Basic | None,
+) -> tuple[Equation, ...]:
+    """Bias motion of the outboard body from that of its parent."""
+    w_i, wd_i, a_i = (part(PARENT_MOTION.symbol, k) for k in (0, 3, 6))
+    carrier = symbol("K", 3, 3)
+    seen = symbol("w_Q", 3)
+    local = symbol("c_s", 6)
+    lever = RO.symbol if _is_zero(position) else RO.symbol + RT.symbol * position
+    own = imposed if imposed is not None and _is_zero(c) else c
+    if own is c and imposed is not None:
+        own = c + imposed
+    equations = [
+        Equation("rotation to the parent", R.symbol, RT.symbol * rotation),
+        Equation("lever in the parent", SHIFT.symbol, lever),
+        Equation("carrier's K = wd~ + w~ w~", carrier, tilde(wd_i) + tilde(w_i) * tilde(w_i)),
+        Equation("carrier's angular velocity in body axes", seen, R.symbol.T * w_i),
+        Equation("hinge's own acceleration", local, own),
+    ]
+    angular = R.symbol.T * wd_i + part(local, 3)
+    if not _is_zero(w):
+        angular = angular + tilde(part(seen, 0)) * w
+    linear = R.symbol.T * (a_i + carrier * SHIFT.symbol) + part(local, 0)
+    if not _is_zero(v):
+        linear = linear + 2 * tilde(part(seen, 0)) * v
+    motion = stack(seen + w, angular, linear)
+    equations.append(Equation("bias motion", MOTION.symbol, motion))
+    return tuple(equations)
+
+
+def _is_zero(value: sp.Basic) -> bool:
+    """Whether an explicit matrix is zero throughout."""
+    return isinstance(value, sp.MatrixBase) and value.is_zero_matrix is True
+
+
+def forward(motion: HingeMotion, inputs: tuple[Quantity, ...]) -> Derivation:
+    """Hinge kinematics and bias motion in one kernel; s are the prescribed accelerations."""
+    nu = motion.nu
+    s = Quantity(symbol("s", nu), "", "prescribed part of udot (zero where free)")
+    h = motion.in_arrays(motion.subspace)
+    rates = symbol("qdot", motion.rates.rows)
+    equations = _bias_equations(
+        motion.in_arrays(motion.rotation),
+        motion.in_arrays(motion.position),
+        motion.in_arrays(motion.velocity),
+        motion.in_arrays(motion.spin),
+        motion.in_arrays(motion.bias),
+        h * s.symbol if nu else None,
+    )
+    return Derivation(
+        motion.hinge.name,
+        f"bias motion behind the {motion.hinge.title}",
+        (RT, RO, *inputs, s, PARENT_MOTION),
+        (R, SHIFT, MOTION, Quantity(rates, "", "coordinate rates")),
+        (*equations, Equation("coordinate rates", rates, motion.in_arrays(motion.rates))),
+        sources=SOURCES,
+    )
+
+
+def forward_generic(nu: int) -> Derivation:
+    """Bias motion from the outputs of any hinge kernel (R, d, H, v, w, c)."""
+    rotation, d, h = symbol("R", 3, 3), symbol("d", 3), symbol("H", 6, nu)
+    v, w, c, s = symbol("v", 3), symbol("w", 3), symbol("c", 6), symbol("s", nu)
+    equations = _bias_equations(rotation, d, column(v), column(w), c, h * s if nu else None)
+    hinge = tuple(Quantity(x) for x in (rotation, d, h, v, w, c, s))
+    return Derivation(
+        f"generic{nu}",
+        f"bias motion behind a hinge with {nu} speeds",
+        (RT, RO, *hinge, PARENT_MOTION),
+        (R, SHIFT, MOTION),
+        equations,
+        sources=SOURCES,
+    )
+
+
+def transport(force: sp.MatrixSymbol) -> sp.BlockMatrix:
+    """X^T f: the load at P, felt at P of the parent, parent axes."""
+    push = R.symbol * part(force, 0)
+    return stack(push, R.symbol * part(force, 3) + tilde(column(SHIFT.symbol)) * push)
+
+
+def congruence(name: str) -> tuple[tuple[Equation, ...], sp.BlockMatrix]:
+    """X^T S X by blocks: rotate to parent axes, then shift to the parent's P."""
+    reduced = symbol(name, 6, 6)
+    a, b, c = (
+        sp.ImmutableDenseMatrix(3, 3, lambda i, j, k=k, m=m: reduced[i + k, j + m])
+        for k, m in ((0, 0), (0, 3), (3, 3))
+    )
+    turned_a, turned_b, turned_c = symbol("A", 3, 3), symbol("B", 3, 3), symbol("C", 3, 3)
+    lever = tilde(column(SHIFT.symbol))
+    moved_b = symbol("B_I", 3, 3)
+    equations = (
+        Equation(
+            "force-acceleration block, parent axes",
+            turned_a,
+            R.symbol * a * R.symbol.T,
+            symmetric=True,
+        ),
+        Equation("mixed block, parent axes", turned_b, R.symbol * b * R.symbol.T),
+        Equation(
+            "moment-rotation block, parent axes",
+            turned_c,
+            R.symbol * c * R.symbol.T,
+            symmetric=True,
+        ),
+        Equation("mixed block at the parent's P", moved_b, turned_b - turned_a * lever),
+    )
+    corner = turned_c + lever * moved_b - turned_b.T * lever
+    return equations, sp.BlockMatrix([[turned_a, moved_b], [moved_b.T, corner]])
+
+
+def outboard_deviation() -> sp.BlockMatrix:
+    """X delta_I: deviation of the body for udot = 0, own axes."""
+    a, alpha = part(PARENT_DELTA.symbol, 0), part(PARENT_DELTA.symbol, 3)
+    linear = R.symbol.T * (a - tilde(column(SHIFT.symbol)) * alpha)
+    return stack(linear, R.symbol.T * alpha)
+
+
+def unit_directions(subspace: sp.MatrixBase) -> dict[int, int]:
+    """{row: column} for every column of H that is a unit vector."""
+    found = {}
+    for j in range(subspace.cols):
+        direction = list(subspace[:, j])
+        if direction.count(0) == 5 and direction.count(1) == 1:
+            found[direction.index(1)] = j
+    return found
+
+
+def condense(
+    nu: int,
+    subspace: sp.MatrixBase | None = None,
+    inputs: tuple[Quantity, ...] = (),
+    name: str | None = None,
+) -> Derivation:
+    """S and e carried across a hinge to the parent; gains G, g for the way back.
+
+    D = H^T S H + J,  G = D^-1 H^T S,  g = D^-1 (tau - H^T e)
+    S_Q = S - S H G,  e_Q = e + S H g   (then transported by X)
+
+    With an explicit `subspace` (no rotor inertia J) rows of S_Q along unit directions of H vanish
+    identically and are not computed, and the same rows of e_Q are the efforts tau.
+    """
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
+    gain, offset = gains(nu)
+    equations: list[Equation] = []
+    specialised = subspace is not None
+    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
+    h: sp.Basic = sp.ImmutableDenseMatrix(subspace) if specialised else h_given.symbol
+    reduced, load = symbol("S_Q", 6, 6), symbol("e_Q", 6)
+    if nu:
+        push, pivot = symbol("U", 6, nu), symbol("D", nu, nu)
+        inertia = h.T * push
+        if not specialised:
+            inertia = inertia + sp.ImmutableDenseMatrix(sp.diag(*column(rotor.symbol)))
+        units = unit_directions(subspace) if specialised else {}
+        zeros = tuple((i, j) for i in range(6) for j in range(6) if i in units or j in units)
+        passed = E.symbol + push * offset.symbol
+        equations = [
+            Equation("U = S H", push, S.symbol * h),
+            Equation("D = H^T U + J", pivot, inertia),
+            Equation("G = D^-1 U^T", gain.symbol, Solve(pivot, push.T, symmetric=True)),
+            Equation(
+                "g = D^-1 (tau - H^T e)",
+                offset.symbol,
+                Solve(pivot, tau.symbol - h.T * E.symbol, symmetric=True),
+            ),
+            Equation(
+                "S_Q = S - U G", reduced, S.symbol - push * gain.symbol, zeros=zeros, symmetric=True
+            ),
+            Equation("e_Q = e + U g", symbol("e_full", 6), passed),
+            Equation("e_Q", load, replace_rows(symbol("e_full", 6), tau.symbol, units)),
+        ]
+    else:
+        equations = [
+            Equation("S_Q = S", reduced, S.symbol),
+            Equation("e_Q = e", load, E.symbol),
+        ]
+    steps, transported = congruence("S_Q")
+    equations += [
+        *steps,
+        Equation("X^T S_Q X", PARENT_S.symbol, transported),
+        Equation("X^T e_Q", PARENT_E.symbol, transport(load)),
+    ]
+    given = inputs if specialised else (h_given, rotor)
+    return Derivation(
+        name or f"generic{nu}",
+        f"S and e carried across a hinge with {free_speeds(nu)}",
+        (R, SHIFT, *given, FLOOR, S, E, tau),
+        (gain, offset, PARENT_S, PARENT_E),
+        tuple(equations),
+        sources=SOURCES,
+    )
+
+
+def replace_rows(
+    full: sp.MatrixSymbol, tau: sp.MatrixSymbol, units: dict[int, int]
+) -> sp.ImmutableDenseMatrix:
+    """A load whose rows along unit directions are the efforts there."""
+    return sp.ImmutableDenseMatrix(
+        [tau[units[i], 0] if i in units else full[i, 0] for i in range(6)]
+    )
+
+
+def pivot_guards(
+    nu: int,
+    subspace: sp.MatrixBase | None = None,
+    floor: sp.Basic = FLOOR.symbol,
+    pivots: sp.MatrixBase | None = None,
+    whole: sp.Basic = S.symbol,
+) -> tuple[tuple[sp.Basic, int, str], ...]:
+    """Each diagonal entry of D against what the body's own inertia lets pass for rounding.
+
+    Not against the inertia of all that hangs on it: across the plane of a long planar chain that
+    grows with the cube of its length, while the pivots in the plane stay what they are.  A body
+    without inertia of its own has nothing else to be judged by (`whole`, whose diagonal counts).
+    `pivots` is the diagonal of D where D itself is no quantity.
+    """
+    pivots = diagonal(symbol("D", nu, nu)) if pivots is None else pivots
+    h = symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
+    guards = []
+    for i in range(nu):
+        along = sum(h[k, i] ** 2 for k in range(3))
+        about = sum(h[k, i] ** 2 for k in range(3, 6))
+        least = along * _own_or_all(floor[0, 0], whole, 0)
+        least += about * _own_or_all(floor[1, 0], whole, 3)
+        text = f"speed {i + 1} of {nu} moves no inertia: its acceleration is undetermined"
+        guards.append((pivots[i, 0] > least, 1, text))
+    return tuple(guards)
+
+
+def _own_or_all(own: sp.Expr, whole: sp.Basic, first: int) -> sp.Expr:
+    """The body's own floor, or that of all that hangs on it where the body has no inertia."""
+    return sp.Piecewise((own, own > 0), (floor_of(whole)[first // 3], True))
+
+
+def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
+    """Share of the mean mass and mean moment of inertia of a mass matrix (6 x 6)."""
+    return sp.ImmutableDenseMatrix(
+        [PIVOT_FLOOR * sum(mass[first + k, first + k] for k in range(3)) / 3 for first in (0, 3)]
+    )
+
+
+def recover(
+    nu: int,
+    subspace: sp.MatrixBase | None = None,
+    inputs: tuple[Quantity, ...] = (),
+    name: str | None = None,
+) -> Derivation:
+    """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
+    gain, offset = gains(nu)
+    h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
+    h = sp.ImmutableDenseMatrix(subspace) if subspace is not None else h_given.symbol
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
+    carried = symbol("delta_Q", 6)
+    equations = [Equation("X delta_I", carried, outboard_deviation())]
+    if nu:
+        equations += [
+            Equation("udot = g - G X delta_I", rates.symbol, offset.symbol - gain.symbol * carried),
+            Equation("deviation of the body", DELTA.symbol, carried + h * rates.symbol),
+        ]
+    else:
+        equations.append(Equation("deviation of the body", DELTA.symbol, carried))
+    given = inputs if subspace is not None else (h_given,)
+    return Derivation(
+        name or f"generic{nu}",
+        f"accelerations recovered across a hinge with {free_speeds(nu)}",
+        (R, SHIFT, *given, gain, offset, PARENT_DELTA),
+        (rates, DELTA),
+        tuple(equations),
+        sources=SOURCES,
+    )
+
+
+def effort(nu: int) -> Derivation:
+    """tau = H^T f: what a hinge's coordinates feel of the load f at P."""
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    force = Quantity(symbol("f", 6), "N, N*m", "load of the inboard on the outboard side at P")
+    tau = Quantity(symbol("tau", nu), "N, N*m", "efforts along the speeds")
+    return Derivation(
+        f"generic{nu}",
+        f"efforts of a hinge with {nu} speeds",
+        (h, force),
+        (tau,),
+        (Equation("tau = H^T f", tau.symbol, h.symbol.T * force.symbol),),
+    )
+
+
+def exerted(nu: int) -> Derivation:
+    """e = S H udot: the load at P that the accelerations of a hinge ask for."""
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
+    whole = Quantity(S.symbol, "", "inertia of everything outboard, at P", symmetric=True)
+    return Derivation(
+        f"generic{nu}",
+        f"load of what a hinge with {nu} speeds accelerates",
+        (whole, h, rates),
+        (E,),
+        (Equation("e = S H udot", E.symbol, S.symbol * (h.symbol * rates.symbol)),),
+    )
+
+
+def project(nu: int) -> Derivation:
+    """udot = (H^T H)^-1 H^T (delta - X delta_I): accelerations of a hinge between known motions."""
+    h = Quantity(symbol("H", 6, nu), "", "motion subspace")
+    rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
+    carried, gap, gram = symbol("delta_Q", 6), symbol("gap", 6), symbol("HH", nu, nu)
+    return Derivation(
+        f"generic{nu}",
+        f"accelerations of a hinge with {nu} speeds from those of its bodies",
+        (R, SHIFT, h, DELTA, PARENT_DELTA),
+        (rates,),
+        (
+            Equation("X delta_I", carried, outboard_deviation()),
+            Equation("relative deviation", gap, DELTA.symbol - carried),
+            Equation("H^T H", gram, h.symbol.T * h.symbol),
+            Equation("udot", rates.symbol, Solve(gram, h.symbol.T * gap, symmetric=True)),
+        ),
+    )

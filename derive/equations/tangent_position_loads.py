@@ -1,0 +1,274 @@
+"""The tangent where loads change with the place of their body: nine more numbers of motion.
+
+Loads in the axes of space, force elements to the ground and drag change with where a body is and
+how fast it goes.  Behind the hinges that lead to them the load then changes by
+
+    df = S z + S_p p + e,      p = [psi; r; v],
+
+the turn of the body, the change of place of its P and that of its velocity, in body axes, beside z
+of `tangent`.  Across a hinge, with theta and x the turn and the change of place along an unknown,
+
+    p = Th_p p_I + Th_z z_I + B_p x,    Th_p p_I + Th_z z_I = [R^T psi;  R^T (r - r~ psi);
+                                                                R^T (v - r~ dw)],
+    B_p = [theta;  x;  dv_rel - theta~ (v - v_rel) + w_Q~ x]
+
+so that the elimination of `tangent` goes on with further columns of the same kind:
+
+    K = S B + S_p B_p,    S_p,I += X^T (S_p - V D^-1 H^T S_p) Th_p,    S_I += X^T (...) Th_z,
+    x = y - D^-1 H^T (S z + S_p p)
+
+The kernels here go beside those of `tangent` and `tangent_hinge`: of a hinge, S_p B_p is added to G
+and H^T S_p B_p to W beforehand, of a flexible body to its own load and rows.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from .block_matrices import column, part, stack, symbol
+from .riccati_sweep import SHIFT, R
+from .tangent_hinge_elimination import PLACE, TURN
+from .tangent_sweep import ANSWER, OWN_D, OWN_K, SOURCES, V_REL, Z_PARENT, D, H, N, V
+
+P = Quantity(vector("p", 9), "", "change of place: turn, place and velocity of P, own axes")
+_P_PARENT = Quantity(vector("p_I", 9), "", "change of the parent's place, parent axes")
+_ROWS_S = Quantity(symbol("S_p", 9, 6), "", "change of the load by the place, a row an entry")
+_B = Quantity(sp.MatrixSymbol("B_p", N, 9), "", "change of place along the unknowns")
+_GAIN = Quantity(sp.MatrixSymbol("gain", N, 9), "", "D^-1 times the rows by the place")
+_OWN_ROWS = Quantity(sp.MatrixSymbol("Z_p", 9, N), "", "own rows by the place, a row an entry")
+
+
+def _moved() -> sp.BlockMatrix:
+    """Th_p p_I + Th_z z_I."""
+    turn, place, velocity = (part(_P_PARENT.symbol, 3 * k) for k in range(3))
+    lever, spin = tilde(column(SHIFT.symbol)), part(Z_PARENT.symbol, 0)
+    return stack(
+        R.symbol.T * turn,
+        R.symbol.T * (place - lever * turn),
+        R.symbol.T * (velocity - lever * spin),
+    )
+
+
+def placed_moved() -> Derivation:
+    """p behind a hinge by the motion of the parent alone."""
+    return Derivation(
+        "frames",
+        "change of a body's place by the motion of its parent",
+        (R, SHIFT, Z_PARENT, _P_PARENT),
+        (P,),
+        (Equation("Th_p p_I + Th_z z_I", P.symbol, _moved()),),
+        sources=SOURCES,
+    )
+
+
+def placed_pose() -> Derivation:
+    """Axes, place and velocity of a body by a change of its place."""
+    axes = Quantity(symbol("A", 3, 3), "", "axes, body to inertial")
+    d_axes = Quantity(symbol("d_A", 3, 3), "", "their change")
+    d_place = Quantity(vector("d_x", 3), "m", "change of place of P, inertial axes")
+    d_velocity = Quantity(vector("d_v", 3), "m/s", "change of velocity of P, own axes")
+    turn, place, velocity = (part(P.symbol, 3 * k) for k in range(3))
+    return Derivation(
+        "frames",
+        "pose and velocity by a change of place",
+        (axes, P),
+        (d_axes, d_place, d_velocity),
+        (
+            Equation("A psi~", d_axes.symbol, axes.symbol * tilde(turn)),
+            Equation("A r", d_place.symbol, axes.symbol * place),
+            Equation("v", d_velocity.symbol, velocity),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_column() -> Derivation:
+    """B_p along one direction of a hinge or of a section."""
+    velocity = Quantity(vector("v_P", 3), "m/s", "velocity of P, own axes")
+    d_v = Quantity(vector("d_v", 3), "m/s", "change of the relative velocity")
+    of_q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w first")
+    turn, place = column(TURN.symbol), column(PLACE.symbol)
+    carried = sp.ImmutableDenseMatrix(column(velocity.symbol) - column(V_REL.symbol))
+    along = column(d_v.symbol) - tilde(turn) * carried + tilde(part(of_q.symbol, 0)) * place
+    return Derivation(
+        "frames",
+        "change of place along a direction",
+        (TURN, PLACE, velocity, V_REL, d_v, of_q),
+        (Quantity(symbol("B_p", 9), "", "change of place along the direction"),),
+        (Equation("B_p", symbol("B_p", 9), stack(turn, place, along)),),
+        sources=SOURCES,
+    )
+
+
+def placed_carry() -> Derivation:
+    """S_p Th_p and S_p Th_z, and both with X^T added to the parent's."""
+    along = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
+    by_spin = Quantity(symbol("T_w", 3, 6), "", "S_p Th_z by angular velocity", accumulate=True)
+    to_place = Quantity(symbol("S_pI", 9, 6), "", "that of the parent", accumulate=True)
+    to_spin = Quantity(symbol("S_wI", 3, 6), "", "the parent's S, of it that", accumulate=True)
+    s = _ROWS_S.symbol.T
+    turn, place, velocity = (s[:, 3 * k : 3 * k + 3] for k in range(3))
+    t_turn, t_place, t_velocity, t_spin = (
+        symbol(f"T_{name}", 6, 3) for name in ("psi", "r", "v", "dw")
+    )
+    lever = tilde(column(SHIFT.symbol))
+    whole, pushed = symbol("T_all", 6, 12), symbol("push", 3, 12)
+    carried = symbol("carried", 6, 12)
+    moment = R.symbol * whole[3:, :] + lever * pushed
+    return Derivation(
+        "frames",
+        "change of a load by place carried to the parent",
+        (R, SHIFT, _ROWS_S),
+        (along, by_spin, to_place, to_spin),
+        (
+            Equation("by place", t_place, place * R.symbol.T),
+            Equation("by turn", t_turn, turn * R.symbol.T - t_place * lever),
+            Equation("by velocity", t_velocity, velocity * R.symbol.T),
+            Equation("by angular velocity", t_spin, -(t_velocity * lever)),
+            Equation(
+                "S_p [Th_p, Th_z]",
+                whole,
+                sp.BlockMatrix([[t_turn, t_place, t_velocity, t_spin]]),
+            ),
+            Equation("S_p Th_p, by rows", along.symbol, whole[:, :9].T),
+            Equation("S_p Th_z, by rows", by_spin.symbol, whole[:, 9:].T),
+            Equation("forces, parent axes", pushed, R.symbol * whole[:3, :]),
+            Equation("X^T S_p [Th_p, Th_z]", carried, sp.BlockMatrix([[pushed], [moment]])),
+            Equation("X^T S_p Th_p", to_place.symbol, carried[:, :9].T),
+            Equation("X^T S_p Th_z", to_spin.symbol, carried[:, 9:].T),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_known() -> Derivation:
+    """What a change of place that is known adds to `tangent_known`."""
+    known = Quantity(symbol("b_p", 9), "", "change of place that is known")
+    felt = Quantity(symbol("e_S", 6), "N, N*m", "load by what is known", accumulate=True)
+    carried = Quantity(symbol("e_b", 6), "N, N*m", "the same, as it is carried", accumulate=True)
+    load = symbol("e_p", 6)
+    return Derivation(
+        "frames",
+        "load by a change of place that is known",
+        (_ROWS_S, known),
+        (felt, carried),
+        (
+            Equation("S_p b_p", load, _ROWS_S.symbol.T * known.symbol),
+            Equation("to what is felt", felt.symbol, load),
+            Equation("to what is carried", carried.symbol, load),
+        ),
+        sources=SOURCES,
+    )
+
+
+# --- any number of unknowns ---------------------------------------------------------------------
+
+
+def placed_rows() -> Derivation:
+    """Rows of a hinge by place."""
+    rows = Quantity(_OWN_ROWS.symbol, "", "rows by the place, a row an entry")
+    return Derivation(
+        "tangent",
+        "rows of a hinge by the change of place",
+        (H, _ROWS_S),
+        (rows,),
+        (Equation("S_p^T H", rows.symbol, _ROWS_S.symbol * H.symbol),),
+        sources=SOURCES,
+    )
+
+
+def placed_own() -> Derivation:
+    """What the place that the unknowns bring a body to adds to the load and to rows."""
+    load = Quantity(OWN_K.symbol, accumulate=True)
+    rows = Quantity(OWN_D.symbol, accumulate=True)
+    return Derivation(
+        "tangent",
+        "load and rows along the unknowns by the change of place",
+        (_B, _ROWS_S, _OWN_ROWS),
+        (load, rows),
+        (
+            Equation("S_p B_p", load.symbol, _B.symbol * _ROWS_S.symbol),
+            Equation("Z_p B_p", rows.symbol, _B.symbol * _OWN_ROWS.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_reduce() -> Derivation:
+    """S_p without the unknowns of a hinge."""
+    inverse = Quantity(sp.MatrixSymbol("inverse", N, N), "", "D^-1")
+    v = Quantity(sp.MatrixSymbol("V", N, 6), "", "K + G, a row a direction")
+    change = Quantity(_ROWS_S.symbol, "", _ROWS_S.meaning, accumulate=True)
+    return Derivation(
+        "tangent",
+        "unknowns of a hinge eliminated from loads by place",
+        (inverse, _OWN_ROWS, v),
+        (_GAIN, change),
+        (
+            Equation("D^-1 H^T S_p", _GAIN.symbol, inverse.symbol * _OWN_ROWS.symbol.T),
+            Equation("- V D^-1 H^T S_p", change.symbol, -_GAIN.symbol.T * v.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_node() -> Derivation:
+    """S_p without the unknowns of a flexible body."""
+    right = Quantity(sp.MatrixSymbol("right", N, 9), "", "rows by the place")
+    without = Quantity(symbol("S_c", 9, 6), "", "S_p without the unknowns, a row an entry")
+    return Derivation(
+        "tangent",
+        "unknowns of a flexible body eliminated from loads by place",
+        (H, V, D, _ROWS_S, _OWN_ROWS),
+        (right, _GAIN, without),
+        (
+            Equation("H^T S_p", right.symbol, H.symbol.T * _ROWS_S.symbol.T + _OWN_ROWS.symbol.T),
+            Equation("D^-1 H^T S_p", _GAIN.symbol, Solve(D.symbol, right.symbol)),
+            Equation(
+                "S_p - V D^-1 H^T S_p",
+                without.symbol,
+                _ROWS_S.symbol - _GAIN.symbol.T * V.symbol.T,
+            ),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_absorb() -> Derivation:
+    """What `absorb` leaves out: loads by place of what hangs on a port of a flexible body."""
+    along = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
+    load = Quantity(OWN_K.symbol, accumulate=True)
+    rows = Quantity(_OWN_ROWS.symbol, accumulate=True)
+    by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
+    k = sp.MatrixSymbol("K_x", 6, N)
+    pushed = sp.MatrixSymbol("force", 3, N)
+    lever = tilde(column(SHIFT.symbol))
+    felt = sp.BlockMatrix([[pushed.T, (R.symbol * k[3:, :] + lever * pushed).T]])
+    return Derivation(
+        "tangent",
+        "loads by place of what hangs on a port, as the unknowns of its body see them",
+        (R, SHIFT, H, _B, _ROWS_S, along),
+        (load, rows, by_unknowns),
+        (
+            Equation("S_p B_p", k, _ROWS_S.symbol.T * _B.symbol.T),
+            Equation("force of S_p B_p", pushed, R.symbol * k[:3, :]),
+            Equation("X^T S_p B_p", load.symbol, felt),
+            Equation("H^T S_p Th_p", rows.symbol, along.symbol * H.symbol),
+            Equation("H^T S_p B_p", by_unknowns.symbol, k.T * H.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def placed_left() -> Derivation:
+    """y less what the place makes of the rows."""
+    left = Quantity(ANSWER.symbol, "", "what is left of the rows", accumulate=True)
+    return Derivation(
+        "tangent",
+        "rows less what the change of place makes of them",
+        (_GAIN, P),
+        (left,),
+        (Equation("- D^-1 H^T S_p p", left.symbol, -(_GAIN.symbol * P.symbol)),),
+        sources=SOURCES,
+    )

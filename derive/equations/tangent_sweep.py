@@ -1,0 +1,335 @@
+"""The exact tangent of inverse dynamics, eliminated from the tips to the root.
+
+Let every hinge have unknowns x along which its coordinates, speeds and accelerations change
+together, as a step of an implicit method wants it.  Behind a hinge the load f at P of a body
+changes by
+
+    df = S z + e,      z = [dw; dwd; da],
+
+the changes of angular velocity, of angular acceleration and of acceleration (gravity inside it) in
+body axes.  Nine numbers, for the hinge axes turn with the body: the three are different images of
+the unknowns inboard.  Position, attitude and velocity drop out, all components being those of the
+body.  Across a hinge
+
+    z = Th z_I + B x,      f_I = X^T f,      dX^T f = X^T G x,      rows: H^T df + W x = r
+
+(Th, X: motion and load carried by the hinge as it stands; B, G, W: their slopes along x, which come
+from the hinge's own kernel differentiated), so that with K = S B
+
+    D = H^T K + W,      S_I += X^T (S - (K + G) D^-1 H^T S) Th,
+                        e_I += X^T (e + (K + G) D^-1 (r - H^T e))
+
+Where parts of the increments are known beforehand (stages of a method), b is the motion and g the
+load that they make of one hinge, z = Th z_I + b + B x, and w what they make of its rows; with S_c
+what is carried on in place of S,
+
+    y = D^-1 (r - w - H^T e),   e_I += X^T (e + V y + S_c b + g),   x = y - D^-1 H^T S (Th z_I + b)
+
+Modal coordinates are unknowns of the same kind, whose body adds a load K x of its own and rows of
+its own.  Arrays with a column per unknown or per entry of z are kept with a row for each, as they
+are made one direction at a time.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
+from .block_matrices import column, part, stack, symbol
+from .riccati_sweep import SHIFT, E, R
+
+#: Number of unknowns of a hinge, or of a flexible body.
+N = sp.Symbol("n", integer=True, positive=True)
+
+SOURCES = (
+    "Rui, Wang, Zhang, ch. 8, 8.13 (linearised discrete-time form)",
+    "Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)",
+)
+
+TURN_PARENT = Quantity(vector("w_I", 3), "rad/s", "angular velocity of the parent, parent axes")
+V_REL = Quantity(vector("v", 3), "m/s", "relative velocity of the hinge, body axes")
+W_REL = Quantity(vector("w", 3), "rad/s", "relative angular velocity of the hinge, body axes")
+Z_PARENT = Quantity(vector("z_I", 9), "", "change of the parent's motion, parent axes")
+Z = Quantity(vector("z", 9), "", "change of the body's motion, own axes")
+ROWS_S = Quantity(symbol("S", 9, 6), "", "change of the load by that of the motion, a row an entry")
+
+
+def _spun() -> sp.ImmutableDenseMatrix:
+    """Acceleration of P by the parent's change of angular velocity: (w x r)~ + w~ r~."""
+    w, r = column(TURN_PARENT.symbol), column(SHIFT.symbol)
+    return sp.ImmutableDenseMatrix(tilde(tilde(w) * r) + tilde(w) * tilde(r))
+
+
+def tangent_carry() -> Derivation:
+    """S Th, and X^T S Th added to the parent's S."""
+    along = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    parent = Quantity(symbol("S_I", 9, 6), "", "that of the parent", accumulate=True)
+    s = ROWS_S.symbol.T
+    turn, rate, linear = (s[:, 3 * k : 3 * k + 3] for k in range(3))
+    t_turn, t_rate, t_linear = (symbol(f"T_{name}", 6, 3) for name in ("w", "wd", "a"))
+    velocity, turned = symbol("v_I", 3), symbol("T_turn", 3, 3)
+    relative, lever = tilde(column(W_REL.symbol)), tilde(column(SHIFT.symbol))
+    whole, pushed = symbol("T_all", 6, 9), symbol("push", 3, 9)
+    moment = R.symbol * whole[3:, :] + lever * pushed
+    return Derivation(
+        "frames",
+        "change of a load carried to the parent",
+        (R, SHIFT, TURN_PARENT, V_REL, W_REL, ROWS_S),
+        (along, parent),
+        (
+            Equation("relative velocity, parent axes", velocity, R.symbol * V_REL.symbol),
+            Equation(
+                "acceleration of P by the parent's change of angular velocity",
+                turned,
+                _spun() + 2 * tilde(column(velocity)),
+            ),
+            Equation("by acceleration", t_linear, linear * R.symbol.T),
+            Equation("by angular acceleration", t_rate, rate * R.symbol.T - t_linear * lever),
+            Equation(
+                "by angular velocity",
+                t_turn,
+                (turn - rate * relative) * R.symbol.T - t_linear * turned,
+            ),
+            Equation("S Th", whole, sp.BlockMatrix([[t_turn, t_rate, t_linear]])),
+            Equation("S Th, by rows", along.symbol, whole.T),
+            Equation("forces, parent axes", pushed, R.symbol * whole[:3, :]),
+            Equation("X^T S Th", parent.symbol, sp.BlockMatrix([[pushed.T, moment.T]])),
+        ),
+        sources=SOURCES,
+    )
+
+
+def outboard_motion() -> tuple[Equation, sp.BlockMatrix]:
+    """Th z_I, and the equation that it needs before."""
+    turn, rate, linear = (part(Z_PARENT.symbol, 3 * k) for k in range(3))
+    lever = tilde(column(SHIFT.symbol))
+    seen = symbol("dw", 3)
+    relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
+    moved = linear - lever * rate - _spun() * turn
+    return Equation("change of the angular velocity", seen, R.symbol.T * turn), stack(
+        seen,
+        R.symbol.T * rate - relative * seen,
+        R.symbol.T * moved - 2 * (velocity * seen),
+    )
+
+
+def tangent_moved() -> Derivation:
+    """Th z_I: change of the body's motion by that of its parent's alone."""
+    first, moved = outboard_motion()
+    return Derivation(
+        "frames",
+        "change of a body's motion by that of its parent's",
+        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT),
+        (Z,),
+        (first, Equation("Th z_I", Z.symbol, moved)),
+        sources=SOURCES,
+    )
+
+
+# --- increments that are known ------------------------------------------------------------------
+
+KNOWN = Quantity(symbol("b", 9), "", "change of motion that is known")
+KNOWN_LOAD = Quantity(symbol("e_b", 6), "N, N*m", "load by what is known, without the unknowns")
+_TURNED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by what is known")
+
+
+def tangent_known() -> Derivation:
+    """S b, as rows of unknowns see it, and S b + g, as it is carried on.
+
+    With S as it is without the unknowns, the rows of the unknowns themselves need no more than
+    z + b in place of z (see `tangent_answer`)."""
+    felt = Quantity(symbol("e_S", 6), "N, N*m", "load by the motion that is known")
+    return Derivation(
+        "frames",
+        "load by a motion that is known",
+        (ROWS_S, KNOWN, _TURNED_LOAD),
+        (felt, KNOWN_LOAD),
+        (
+            Equation("S b", felt.symbol, ROWS_S.symbol.T * KNOWN.symbol),
+            Equation("S b + g", KNOWN_LOAD.symbol, felt.symbol + _TURNED_LOAD.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+# --- any number of unknowns ---------------------------------------------------------------------
+
+
+def _rows(name: str, width: int, meaning: str) -> Quantity:
+    """A row of `width` numbers per unknown."""
+    return Quantity(sp.MatrixSymbol(name, N, width), "", meaning)
+
+
+def _square(name: str, meaning: str) -> Quantity:
+    return Quantity(sp.MatrixSymbol(name, N, N), "", meaning)
+
+
+H = Quantity(sp.MatrixSymbol("H", 6, N), "", "motion subspace of the unknowns")
+B = _rows("B", 9, "motion along the unknowns")
+G = _rows("G", 6, "change of the load that is carried")
+W = _square("W", "slopes of the rows, a row a direction")
+D = _square("D", "rows by unknowns")
+V = Quantity(sp.MatrixSymbol("V", 6, N), "", "K + G")
+GAIN = _rows("gain", 9, "D^-1 times the rows by the motion")
+ANSWER = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times what is left of the rows")
+RIGHT = _rows("right", 9, "rows by the motion")
+OWN_K = _rows("K", 6, "own load along the unknowns")
+OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, a row an entry")
+OWN_D = _square("Z_x", "own rows by the unknowns, a row a direction")
+
+
+def invert() -> Derivation:
+    """D^-1 of the rows of a hinge."""
+    unit, inverse = _square("one", "unit matrix"), _square("inverse", "D^-1")
+    return Derivation(
+        "tangent",
+        "inverse of the rows by the unknowns of a hinge",
+        (D, unit),
+        (inverse,),
+        (Equation("D^-1", inverse.symbol, Solve(D.symbol, unit.symbol)),),
+    )
+
+
+def node() -> Derivation:
+    """The unknowns of a flexible body eliminated."""
+    without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, a row an entry")
+    s = ROWS_S.symbol.T
+    k = symbol("K_x", 6, N)
+    return Derivation(
+        "tangent",
+        "unknowns of a flexible body eliminated",
+        (H, B, G, W, ROWS_S, OWN_K, OWN_ROWS, OWN_D),
+        (V, D, RIGHT, GAIN, without),
+        (
+            Equation("K = S B + K", k, s * B.symbol.T + OWN_K.symbol.T),
+            Equation("V = K + G", V.symbol, k + G.symbol.T),
+            Equation(
+                "D = H^T K + W",
+                D.symbol,
+                H.symbol.T * k + W.symbol.T + OWN_ROWS.symbol.T * B.symbol.T + OWN_D.symbol.T,
+            ),
+            Equation("H^T S", RIGHT.symbol, H.symbol.T * s + OWN_ROWS.symbol.T),
+            Equation("D^-1 H^T S", GAIN.symbol, Solve(D.symbol, RIGHT.symbol)),
+            Equation(
+                "S - V D^-1 H^T S",
+                without.symbol,
+                ROWS_S.symbol - GAIN.symbol.T * V.symbol.T,
+            ),
+        ),
+        sources=SOURCES,
+    )
+
+
+def absorb() -> Derivation:
+    """What hangs on a port of a flexible body, as its unknowns see it."""
+    along = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    load = Quantity(OWN_K.symbol, accumulate=True)
+    rows = Quantity(OWN_ROWS.symbol, accumulate=True)
+    by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
+    k = Quantity(sp.MatrixSymbol("K_x", 6, N), "", "S B")
+    force, moment = symbol("force", 3, N), symbol("moment", 3, N)
+    pushed = R.symbol * force
+    lever = tilde(column(SHIFT.symbol))
+    felt = sp.BlockMatrix([[pushed.T, (R.symbol * moment + lever * pushed).T]])
+    return Derivation(
+        "tangent",
+        "what hangs on a port, as the unknowns of its body see it",
+        (R, SHIFT, H, B, G, W, ROWS_S, along),
+        (k, load, rows, by_unknowns),
+        (
+            Equation("S B", k.symbol, ROWS_S.symbol.T * B.symbol.T),
+            Equation("force of K + G", force, k.symbol[:3, :] + G.symbol[:, :3].T),
+            Equation("moment of K + G", moment, k.symbol[3:, :] + G.symbol[:, 3:].T),
+            Equation("X^T (K + G)", load.symbol, felt),
+            Equation("H^T S Th", rows.symbol, along.symbol * H.symbol),
+            Equation("H^T K + W", by_unknowns.symbol, k.symbol.T * H.symbol + W.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def push() -> Derivation:
+    """One right-hand side: y = D^-1 (-e_f - H^T e), and the load e + V y."""
+    own = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows")
+    rest = Quantity(sp.MatrixSymbol("rest", N, 1), "", "what is left of the rows")
+    load = Quantity(symbol("e_c", 6), "N, N*m", "load without the unknowns")
+    return Derivation(
+        "tangent",
+        "unknowns eliminated from a right-hand side",
+        (H, V, D, E, own),
+        (rest, ANSWER, load),
+        (
+            Equation("-e_f - H^T e", rest.symbol, -own.symbol - H.symbol.T * E.symbol),
+            Equation("D^-1 (-e_f - H^T e)", ANSWER.symbol, Solve(D.symbol, rest.symbol)),
+            Equation("e + V y", load.symbol, E.symbol + V.symbol * ANSWER.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def lagged() -> Derivation:
+    """dq = Q times the change of the rates."""
+    inverse = _square("Q", "(sq 1 - kappa g_q)^-1")
+    rate = Quantity(sp.MatrixSymbol("rate", N, 1), "", "change of the rates at given coordinates")
+    change = Quantity(sp.MatrixSymbol("dq", N, 1), "", "change of the coordinates")
+    return Derivation(
+        "tangent",
+        "change of coordinates",
+        (inverse, rate),
+        (change,),
+        (Equation("dq", change.symbol, inverse.symbol * rate.symbol),),
+    )
+
+
+UNKNOWNS = Quantity(sp.MatrixSymbol("x", N, 1), "", "unknowns")
+BEHIND = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' part")
+
+
+def answer() -> Derivation:
+    """x = y - D^-1 H^T S z, and the motion with the unknowns' part."""
+    return Derivation(
+        "tangent",
+        "unknowns that answer a right-hand side",
+        (B, GAIN, ANSWER, BEHIND),
+        (UNKNOWNS, Z),
+        (
+            Equation("x", UNKNOWNS.symbol, ANSWER.symbol - GAIN.symbol * BEHIND.symbol),
+            Equation("z + B x", Z.symbol, BEHIND.symbol + B.symbol.T * UNKNOWNS.symbol),
+        ),
+        sources=SOURCES,
+    )
+
+
+def displaced() -> Derivation:
+    """Motion of what follows the unknowns of a flexible body."""
+    return Derivation(
+        "tangent",
+        "change of motion with the unknowns' part",
+        (B, UNKNOWNS, BEHIND),
+        (Z,),
+        (Equation("z + B x", Z.symbol, BEHIND.symbol + B.symbol.T * UNKNOWNS.symbol),),
+        sources=SOURCES,
+    )
+
+
+def lag() -> Derivation:
+    """Q = (sq 1 - kappa g_q)^-1 of a hinge whose rates depend on its coordinates: dq = Q (...)."""
+    slopes = _square("g_q", "slopes of the rates by the coordinates, a row a direction")
+    unit = _square("one", "unit matrix")
+    scale = Quantity(vector("sq", 1), "1/s", "inverse time of the step")
+    share = Quantity(vector("kappa", 1), "", "1 where the rates' own slopes count")
+    matrix, out = _square("A", "sq 1 - kappa g_q"), _square("Q", "its inverse")
+    return Derivation(
+        "tangent",
+        "change of coordinates by that of their rates",
+        (scale, share, unit, slopes),
+        (matrix, out),
+        (
+            Equation(
+                "sq 1 - kappa g_q",
+                matrix.symbol,
+                scale.symbol[0, 0] * unit.symbol - share.symbol[0, 0] * slopes.symbol.T,
+            ),
+            Equation("its inverse", out.symbol, Solve(matrix.symbol, unit.symbol)),
+        ),
+    )

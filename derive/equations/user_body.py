@@ -1,0 +1,176 @@
+"""Kernels of a body from its residual: mass matrix, inertia force of the bias motion, energy.
+
+The residual (force and moment at the input end that a motion needs) is linear in the
+accelerations; its derivative is the mass matrix, its value at the bias motion the load f_bias.
+
+A body states its equations in axes and about an origin of its own, and may be held anywhere: the
+motion of the internal frame (point P, hinge axes) is carried to the body's own frame and the load
+carried back.  R_u (internal to own axes) and r_u (P from the own origin, own axes) are twelve
+numbers behind the parameters:
+
+    a_O = X a_P + [w x (w x -r_u); 0],   X = [R_u  r_u~ R_u; 0  R_u],   f_P = X^T f_O
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from mstmm.errors import ElementError
+
+from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
+from ..definition.element import Body, Symbols, describe_array
+from .riccati_sweep import MOTION, E, S
+
+#: Numbers of R_u and r_u.
+FRAME = 12
+
+
+def _columns(body: Body) -> tuple[Symbols, sp.MatrixSymbol, Quantity]:
+    p = Symbols("p", tuple(x.name for x in body.parameters))
+    array = vector("p", len(p) + (0 if body.in_hinge_axes else FRAME))
+    meaning = describe_array("parameters", body.parameters)
+    meaning += "; body axes, about its input end" if body.in_hinge_axes else "; then R_u and r_u"
+    return p, array, Quantity(array, "", meaning)
+
+
+def _frame(body: Body, array: sp.MatrixSymbol) -> tuple[sp.Matrix, sp.Matrix, sp.BlockMatrix]:
+    """(R_u, r_u~, X): from the internal frame to the body's own."""
+    first = len(body.parameters)
+    turn = sp.ImmutableDenseMatrix(3, 3, lambda i, j: array[first + 3 * i + j, 0])
+    lever = tilde(_triple(array, first + 9))
+    x = sp.BlockMatrix([[turn, lever * turn], [sp.zeros(3, 3), turn]])
+    return turn, lever, x
+
+
+def _evaluated(matrix: sp.Matrix, p: Symbols, array: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+    replace = {s: array[i, 0] for i, s in enumerate(p)}
+    return sp.ImmutableDenseMatrix(sp.Matrix(matrix).xreplace(replace))
+
+
+def _triple(array: sp.MatrixSymbol, first: int) -> sp.Matrix:
+    return sp.Matrix([array[first + i, 0] for i in range(3)])
+
+
+def _accelerations() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+    return (
+        sp.Matrix(sp.symbols("a_x a_y a_z", real=True)),
+        sp.Matrix(sp.symbols("alpha_x alpha_y alpha_z", real=True)),
+        sp.Matrix(sp.symbols("w_x w_y w_z", real=True)),
+    )
+
+
+def inertia(body: Body) -> Derivation:
+    """S of the body alone: derivative of its residual by the acceleration."""
+    p, array, parameters = _columns(body)
+    a, alpha, w = _accelerations()
+    residual = sp.Matrix(body.residual(a, alpha, w, p))
+    accelerations = sp.Matrix.vstack(a, alpha)
+    mass = residual.jacobian(accelerations).applyfunc(sp.expand)
+    if mass.atoms(sp.Symbol) & set(accelerations):
+        raise ElementError(f"body {body.name}: the residual is not linear in a and alpha")
+    if sp.simplify(mass - mass.T) != sp.zeros(6, 6):
+        raise ElementError(
+            f"body {body.name}: the mass matrix d residual / d [a; alpha] is not symmetric"
+        )
+    if mass.atoms(sp.Symbol) & set(w):
+        raise ElementError(f"body {body.name}: the mass matrix depends on the angular velocity")
+    return Derivation(
+        body.name,
+        f"mass matrix of the {body.title}",
+        (parameters,),
+        (S,),
+        _mass_equations(body, array, _evaluated(mass, p, array)),
+        sources=body.sources,
+    )
+
+
+def bias_load(body: Body) -> Derivation:
+    """e of the body alone: residual at the bias motion."""
+    p, array, parameters = _columns(body)
+    carried = () if body.in_hinge_axes else _motion_equations(body, array)
+    motion = carried[-1].left if carried else MOTION.symbol
+    residual = body.residual(_triple(motion, 6), _triple(motion, 3), _triple(motion, 0), p)
+    return Derivation(
+        body.name,
+        f"load that the bias motion of the {body.title} needs",
+        (parameters, MOTION),
+        (E,),
+        (*carried, *_load_equations(body, array, _evaluated(residual, p, array))),
+        sources=body.sources,
+    )
+
+
+def kinetic_energy(body: Body) -> Derivation:
+    """T from the velocity of P and the angular velocity, body axes."""
+    p, array, parameters = _columns(body)
+    v, w = vector("v", 3), vector("w", 3)
+    energy = sp.MatrixSymbol("T", 1, 1)
+    carried = () if body.in_hinge_axes else _velocity_equations(body, array, v, w)
+    v_own, w_own = (carried[1].left, carried[0].left) if carried else (v, w)
+    value = sp.Matrix([[body.kinetic_energy(_triple(v_own, 0), _triple(w_own, 0), p)]])
+    return Derivation(
+        body.name,
+        f"kinetic energy of the {body.title}",
+        (parameters, Quantity(v, "m/s", "velocity of P"), Quantity(w, "rad/s", "angular velocity")),
+        (Quantity(energy, "J", "kinetic energy"),),
+        (*carried, Equation("kinetic energy", energy, _evaluated(value, p, array))),
+        sources=body.sources,
+    )
+
+
+# --- between the internal frame and the body's own ----------------------------------------------
+
+
+def _mass_equations(
+    body: Body, array: sp.MatrixSymbol, mass: sp.ImmutableDenseMatrix
+) -> tuple[Equation, ...]:
+    if body.in_hinge_axes:
+        return (Equation("S = d residual / d acceleration", S.symbol, mass),)
+    own, (_, _, x) = sp.MatrixSymbol("S_O", 6, 6), _frame(body, array)
+    carry = sp.MatrixSymbol("X", 6, 6)
+    return (
+        Equation("d residual / d acceleration, own frame", own, mass),
+        Equation("X", carry, x),
+        Equation("S = X^T S_O X", S.symbol, carry.T * own * carry),
+    )
+
+
+def _motion_equations(body: Body, array: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    motion, (turn, lever, _) = MOTION.symbol, _frame(body, array)
+    w, wd, own = vector("w_O", 3), vector("wd_O", 3), vector("motion_O", 9)
+    spin = tilde(_triple(w, 0))
+    minus_r = -sp.ImmutableDenseMatrix(_triple(array, len(body.parameters) + 9))
+    a = turn * sp.ImmutableDenseMatrix(_triple(motion, 6)) + lever * wd + spin * (spin * minus_r)
+    return (
+        Equation(
+            "angular velocity, own axes", w, turn * sp.ImmutableDenseMatrix(_triple(motion, 0))
+        ),
+        Equation(
+            "angular acceleration, own axes", wd, turn * sp.ImmutableDenseMatrix(_triple(motion, 3))
+        ),
+        Equation("bias motion of the own origin", own, sp.BlockMatrix([[w], [wd], [a]])),
+    )
+
+
+def _load_equations(
+    body: Body, array: sp.MatrixSymbol, residual: sp.ImmutableDenseMatrix
+) -> tuple[Equation, ...]:
+    if body.in_hinge_axes:
+        return (Equation("e = residual at the bias motion", E.symbol, residual),)
+    own, carry, (_, _, x) = vector("e_O", 6), sp.MatrixSymbol("X", 6, 6), _frame(body, array)
+    return (
+        Equation("residual at the bias motion, own frame", own, residual),
+        Equation("X", carry, x),
+        Equation("e = X^T e_O", E.symbol, carry.T * own),
+    )
+
+
+def _velocity_equations(
+    body: Body, array: sp.MatrixSymbol, v: sp.MatrixSymbol, w: sp.MatrixSymbol
+) -> tuple[Equation, ...]:
+    turn, lever, _ = _frame(body, array)
+    spin, velocity = vector("w_O", 3), vector("v_O", 3)
+    return (
+        Equation("angular velocity, own axes", spin, turn * w),
+        Equation("velocity of the own origin", velocity, turn * v + lever * spin),
+    )

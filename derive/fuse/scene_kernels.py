@@ -1,0 +1,111 @@
+"""Fused engine: the whole sweep of one scene as straight-line KernelIRs, by value numbering.
+
+The schedule is replayed on the nodes of one graph: axes that are aligned, loads that are zero and
+motions that stay in a plane fold away as they arise, and what no acceleration needs is never
+emitted.  No SymPy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from mstmm.ir import KernelIR, Port
+from mstmm.ir.scene_structure import Structure
+
+from ..schedule.sweeps import ACCELERATIONS, FACTORISATION, SOLUTION
+from .fusion_state import FusionState, Kernels
+from .loop_assembly import gaps, slips
+from .optimisation.sum_balancing import BalancedKernels, balance
+from .schedule_interpreter import ScheduleInterpreter
+
+#: The one guard code of kernels whose failures the looped engine names.
+FAILED = 1
+
+#: Power and potential that add at most this part to the operations of accelerations are had with
+#: them: one text for both takes half the time to compile.
+_CHEAP = 0.03
+
+
+@dataclass(frozen=True)
+class FusedSceneIR:
+    """Kernels of one scene.  Guard code 1 + k stands for failures[k] = (reason, element, code).
+
+    Where `power_is_cheap`, "accelerations" need no code of their own beside "accelerations_power".
+    """
+
+    kernels: Mapping[str, KernelIR]
+    failures: tuple[tuple[int, int, int], ...]
+    power_is_cheap: bool = False
+
+
+def inputs_of(structure: Structure) -> list[Port]:
+    """Inputs of every kernel of a scene: p, t, q, u, memory, efforts."""
+    s = structure
+    return [
+        Port("p", (s.np,)), Port("t", (1,)), Port("q", (s.nq,)), Port("u", (s.nu,)),
+        Port("memory", (s.n_memory,)), Port("efforts", (s.nu,)),
+    ]  # fmt: skip
+
+
+def fuse(
+    structure: Structure, kernels: Kernels, numbers: Sequence[float] | None = None
+) -> FusedSceneIR:
+    """Kernel "accelerations" of a scene, and "accelerations_power" where there are laws or loads;
+    where loops are closed "gaps" and "slips" besides (see `closing`).
+
+    Inputs p, t, q, u, memory, efforts; outputs qdot, udot, and with power the power of everything
+    that is not stored and the potential of springs and laws.  With `numbers` the parameters are
+    baked in as constants and p is not read.
+    """
+    state, s = FusionState(structure, kernels, numbers), structure
+    replay = ScheduleInterpreter(state)
+    replay.sweep(ACCELERATIONS)
+    for _ in range(s.refines):  # pivots are those of before: one node each
+        state.given = replay.gathered("udot")
+        replay = ScheduleInterpreter(state, refined=True)
+        replay.sweep(ACCELERATIONS)
+    outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]
+    sums = [Port("power", (1,)), Port("potential", (1,))]
+    values: dict[str, object] = {
+        "qdot": replay.gathered("qdot"), "udot": replay.gathered("udot"),
+    }  # fmt: skip
+    power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
+    found = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
+    cheap = False
+    flexible = any(body.modal is not None for body in s.bodies)
+    if s.laws or s.driven or s.loads or s.forces or s.couplings or flexible:
+        found.append(
+            state.graph.kernel(
+                "accelerations_power", inputs_of(s), [*outputs, *sums], values | power,
+                as_made=True,
+            )
+        )  # fmt: skip
+        alone, both = (kernel.flops() for kernel in found)
+        cheap = both <= (1 + _CHEAP) * alone
+    for close in (gaps, slips) if s.closes else ():
+        found.append(close(FusionState(s, kernels, numbers, state.failures), inputs_of(s)))
+    return FusedSceneIR(BalancedKernels(*found), tuple(state.failures), cheap)
+
+
+def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:
+    """Kernel "solution": M^-1 times one column, and behind it 1 if every pivot moves inertia.
+
+    Inputs as those of "accelerations", of which p, q and memory are read, and the column.
+    """
+    state, s = FusionState(structure, kernels, None), structure
+    state.u, state.efforts = state.zeros(s.nu), state.graph.vector("column", s.nu)
+    replay = ScheduleInterpreter(state, staged=False)
+    replay.sweep(FACTORISATION)
+    replay.sweep(SOLUTION)
+    holds = state.one
+    for condition in replay.conditions:
+        holds = state.graph.call("and", holds, condition)
+    answer = state.graph.kernel(
+        "solution",
+        [*inputs_of(s), Port("column", (s.nu,))],
+        [Port("answer", (s.nu + 1,))],
+        {"answer": [*replay.gathered("answer"), holds]},
+        as_made=True,
+    )
+    return balance(answer)

@@ -1,0 +1,141 @@
+"""The tangent without what velocities and loads add: the mass matrix, and in it the laws' slopes.
+
+It is symmetric, so that it is factored and solved as the mass matrix is: by the same passes over
+slots of its own, behind inverse dynamics, whose hinge motion stays as it is.
+Unknown are accelerations, with which speeds and coordinates change in proportion.  Of a law on
+several speeds the symmetric part of the slopes counts; loads, springs between bodies and what
+stiffens flexible bodies are left out.  An approximation, for iterations and for methods that allow
+one.
+"""
+
+from __future__ import annotations
+
+from .differentiated_passes import D
+from .mass_matrix_solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
+from .pass_steps import (
+    Add,
+    Copy,
+    ForEachDirection,
+    Move,
+    Pass,
+    Run,
+    RunPass,
+    SelectColumns,
+    Sweep,
+    call,
+    elsewhere,
+    only,
+)
+from .tangent_sweep import HINGE_CHANGE, KNOWN_LAWS, LAW_CHANGE
+
+#: Where the mass matrix has its numbers, this tangent has those of its own.
+_SLOTS = {
+    "body.S": "mass.S", "parent.S": "inboard.mass", "hinge.H_free": "tangent.H",
+    "hinge.F": "mass.F", "hinge.G": "mass.G", "hinge.g": "tangent.y", "zero": "tangent.W",
+    **{
+        slot: D + slot
+        for slot in (
+            "body.e", "body.tau", "body.delta", "hinge.rates", "parent.e", "parent.delta",
+            "modes.e_f", "modes.etadd", "modes.felt",
+        )
+    },
+    **{f"modes.{name}": f"shapes.{name}" for name in ("S_rf", "based", "S_ff", "right", "gain")},
+    "modes.work": "bend.work", "section.push": "port.K",
+}  # fmt: skip
+_NAME = "laws"
+
+LAWS_OWN = Pass(
+    "laws_own", "body", "Inertia of a body, and its modes within a step.",
+    (
+        call("body.inertia", when="!modal", p="body.p", S="mass.S"),
+        Copy(to="mass.S", source="body.S", when="modal"),
+        call("frames.pivot_floor", S="mass.S", floor="body.floor"),
+        Copy(to="tangent.laws"),
+        *only(
+            "modal",
+            Copy(to="shapes.S_rf", source="modes.S_rf"),
+            Copy(to="shapes.S_ff", source="modes.S_ff"),
+            call("modal.stiffened", K="modes.K", D="modes.D", rate="step.rate", sq="step.q",
+                 S_ff="shapes.S_ff"),
+        ),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+LAWS_RATES = Pass(
+    "laws_rates", "body", "Rates of the coordinates by each of the speeds.",
+    (
+        ForEachDirection(
+            of="rates",
+            steps=(
+                RunPass(whole=HINGE_CHANGE),
+                Move(to="tangent.along[nq * c]", source=D + "body.qdot", count="nq"),
+            ),
+        ),
+    ),
+    skip="!curved",
+)  # fmt: skip
+
+LAWS_OWN_SLOPES = Pass(
+    "laws_own_slopes",
+    "law",
+    "Slopes of a law along the unknowns of its speeds.",
+    (
+        ForEachDirection(
+            of="law", steps=(*LAW_CHANGE, Add(to="law.own_slopes", source=D + "local.tau"))
+        ),
+    ),
+)
+
+_factorise = elsewhere(FACTORISE, _NAME, _SLOTS)
+LAWS_FACTORISE = Pass(
+    _factorise.name, "body", "Mass matrices with laws carried to the root.",
+    (
+        SelectColumns(to="tangent.W", source="tangent.laws", rows=0),
+        *(step for step in _factorise.steps if step.when != "own"),  # hinges have their motion
+    ),
+    order=FACTORISE.order, skip=FACTORISE.skip,
+)  # fmt: skip
+
+LAWS_ALONE = Sweep(
+    "laws_alone",
+    "The mass matrix and the slopes of laws factored, behind inverse dynamics.",
+    (
+        Run(whole=LAWS_OWN),
+        Run(whole=LAWS_RATES, when="laws"),
+        Run(whole=LAWS_OWN_SLOPES, when="laws"),
+        Run(whole=LAWS_FACTORISE),
+    ),
+)
+
+# --- one right-hand side ------------------------------------------------------------------------
+
+MODES_CHANGE = Pass(
+    "modes_change", "body", "Change of the modes' load by increments that are known.",
+    (
+        call("modal.strained", K="modes.K", D="modes.D", eta=D + "modes.eta",
+             etad=D + "modes.etad", e_f=D + "modes.e_f"),
+    ),
+    skip="!modal",
+)  # fmt: skip
+
+LAWS_SOLUTION = Sweep(
+    "laws_solution",
+    "One right-hand side through the mass matrix with laws.",
+    (
+        Run(whole=elsewhere(COLUMN, _NAME, _SLOTS)),
+        Run(whole=KNOWN_LAWS, when="shifted laws"),
+        Run(whole=MODES_CHANGE, when="shifted flexible"),
+        Run(whole=elsewhere(COLUMN_CARRIED, _NAME, _SLOTS)),
+        Run(whole=elsewhere(COLUMN_ANSWERED, _NAME, _SLOTS)),
+    ),
+)
+
+RATES_CHANGE = Pass(
+    "rates_change", "body", "Change of a hinge's rates by that of its coordinates and speeds.",
+    (
+        RunPass(whole=HINGE_CHANGE),
+        Copy(to="body.change", source=D + "body.qdot"),
+        Add(to="body.change", source="body.rho"),
+    ),
+)  # fmt: skip

@@ -1,0 +1,30 @@
+"""Inverse dynamics: the efforts that prescribed accelerations need, tips to root."""
+
+from __future__ import annotations
+
+from .flexible import FELT
+from .forward_kinematics import HINGE_MOTION
+from .pass_steps import TIPS_TO_ROOT, Copy, EachSpeed, Pass, RunPass, call, only
+
+#: What a load is felt as along the speeds of a hinge, and on the parent.
+FELT_ON_THE_WAY = (
+    call("generic{nu}.effort", H="hinge.H", f="body.e", tau="local.tau"),
+    EachSpeed(
+        steps=(
+            call("frames.driven_effort", felt="local.tau[k]", J="body.rotor[k]",
+                 udot="body.given[k]", tau="body.tau[k]", tau_d="body.required[k]"),
+        ),
+    ),
+    call("frames.transport", Rc="body.R", r="body.r", e="body.e", e_I="parent.e"),
+)  # fmt: skip
+
+REQUIRED = Pass(
+    "required", "body", "Efforts beyond the laws' own, and the load on the parent.",
+    (
+        *only("section", *FELT),
+        Copy(to="modes.required", source="modes.e_f", when="modal"),
+        RunPass(whole=HINGE_MOTION, when="own"),
+        *FELT_ON_THE_WAY,
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip

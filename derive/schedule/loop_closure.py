@@ -1,0 +1,406 @@
+"""Closed loops: rows of the hinges that close them, carried as columns through the sweep.
+
+In place of `condense` and `recover` the elimination of a hinge is kept, as for several right-hand
+sides, and the columns of the rows that are open yet follow the load across it; in code for one
+scene stage by stage, as the load does there.  See derive/equations/loop_closure.py.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .couplings import OF_OWN, OF_OWN_BIAS, OWN_TOLD, TOLD, TOLD_OF_BIAS, efforts_of, efforts_of_own
+from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
+from .forward_kinematics import HINGE_MOTION
+from .pass_steps import (
+    TIPS_TO_ROOT,
+    Add,
+    Call,
+    Copy,
+    EachSpeed,
+    ForEach,
+    Move,
+    Pass,
+    RunPass,
+    ScatterSpeeds,
+    SelectColumns,
+    call,
+    only,
+)
+from .riccati_sweep import (
+    BODY,
+    FREE,
+    FREE_EFFORTS,
+    HANDED_ON,
+    JUDGED,
+    ONWARD,
+    RECOVERED,
+    condensed,
+    eliminate_with_effort,
+)
+
+_MET = {"R_C": "closure.R_C", "r_e": "closure.end"}
+_OWN = {"W": "closure.W", "gap": "closure.gap"}
+
+
+def _row(k: str) -> Call:
+    return call("loops.row", w=f"closure.W[6 * {k}]", **_MET, Rc="body.R", r_A="closure.lever",
+                J_A=f"closure.J_A[6 * {k}]", J_B=f"closure.J_B[6 * {k}]")  # fmt: skip
+
+
+def _known(relative: str, when: str) -> Call:
+    return call("loops.known", when=when, W="closure.W", relative=relative, l="closure.l")
+
+
+def _gap(when: str) -> tuple[Call, ...]:
+    return (call("loops.gap", when=when, R_e="closure.turn", R_C="closure.R_C", d="closure.d",
+                 gap="closure.gap"),)  # fmt: skip
+
+
+_MEETING = (
+    call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
+         r="hinge.d", A="body.R", x="body.r"),
+    call("generic{nu}.complement", when="hinged", fails="hinge", H="hinge.H", W="closure.W"),
+    call("loops.meet", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
+         r_e="closure.end", **BODY, R_C="closure.R_C", r_A="closure.lever", d="closure.d"),
+    call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
+         w_B="outboard.w", slip="closure.slip"),
+)  # fmt: skip
+#: A constraint has directions and a gap of its own.
+_CONSTRAINED = (
+    call("loops.distance", when="distance", p="closure.p", d="closure.d", **_OWN),
+    call("loops.plane", when="plane", p="closure.p", d="closure.d", **_OWN),
+    call("loops.rolling", when="rolling", fails="flat", p="closure.p", R_C="closure.R_C",
+         d="closure.d", **_OWN),
+)  # fmt: skip
+_DRIFT = call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
+              motion_B="outboard.motion", drift="local.drift")  # fmt: skip
+#: Or, where steps close gaps by their accelerations:
+_CLOSING = call("loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative")
+#: And directions that turn.
+_BENT = (
+    call("loops.distance_drift", when="distance", d="closure.d", slip="closure.slip",
+         drift="local.drift"),
+    call("loops.rolling_drift", when="rolling", p="closure.p", R_C="closure.R_C",
+         slip="closure.slip", drift="local.drift"),
+)  # fmt: skip
+#: The load of the hinge's laws, along its own directions.
+_EFFORTS = EachSpeed(
+    steps=(
+        _row("k"),
+        call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
+        call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
+    ),
+)
+
+CLOSURES = Pass(
+    "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
+    (
+        *_MEETING,
+        *_gap("gaping"),
+        *_gap("placing"),
+        *_CONSTRAINED,
+        _known("closure.gap", "gaping"),
+        _known("closure.slip", "slipping"),
+        efforts_of_own("own.told", "refined"),
+        *only("!corrected !placing", _DRIFT, *_BENT, _known("local.drift", "")),
+        *only("placing", _CLOSING, _known("local.relative", "")),
+        _EFFORTS,
+        ForEach(
+            of="rows",
+            steps=(
+                _row("c"),
+                Move(to="side.inner", source="closure.J_A[6 * c]", count="6"),
+                Move(to="side.outer", source="closure.J_B[6 * c]", count="6"),
+                Move(to="line.known", source="closure.l[c]", count="1"),
+                # A rotor resists a correction, but asks for none.
+                Copy(to="line.known", when="corrected soft"),
+                *only(
+                    "refined",
+                    call("loops.loaded", K="closure.J_A[6 * c]", x="line.told", e="parent.e"),
+                    call("loops.loaded", K="closure.J_B[6 * c]", x="line.told", e="outboard.e"),
+                    call("loops.yielded", when="soft", softness="line.softness", s="body.s[c]",
+                         x="line.told", l="line.known"),
+                ),
+            ),
+        ),
+        OF_OWN,
+        OF_OWN_BIAS,
+    ),
+    skip="!cut",
+)  # fmt: skip
+
+#: Multipliers are known here, from an evaluation of accelerations in the same workspace.
+CLOSURES_LOADED = Pass(
+    "closures_loaded", "body", "Rows of a hinge that closes a loop, and all the load that it puts"
+    " on its bodies.",
+    (
+        *_MEETING,
+        *_CONSTRAINED,
+        _DRIFT,
+        *_BENT,
+        _known("local.drift", ""),
+        efforts_of_own("own.x", ""),
+        _EFFORTS,
+        ForEach(
+            of="rows",
+            steps=(
+                _row("c"),
+                call("loops.loaded", K="closure.J_A[6 * c]", x="line.x", e="parent.e"),
+                call("loops.loaded", K="closure.J_B[6 * c]", x="line.x", e="outboard.e"),
+            ),
+        ),
+        OWN_TOLD,
+    ),
+    skip="!cut",
+)  # fmt: skip
+
+_ROW = {"inverse": "row.inverse", "l": "row.known"}
+_COLUMN = {"inverse": "row.inverse", "K": "row.K"}
+
+ROW_CLOSED = Pass(
+    "row_closed", "row", "A row closed on the body where its ends meet.",
+    (
+        Copy(to="row.inverse", when="unmoved"),
+        call("loops.settle", when="!unmoved", inverse="row.inverse", L="row.pivot",
+             floor="row.floor"),
+        call("loops.close", when="!unmoved inside", **_COLUMN, l="row.known", S="meeting.S",
+             e="meeting.e"),
+        ForEach(
+            of="others",
+            steps=(
+                call("loops.shed", when="inside", **_COLUMN, L_p="other.L", K_p="other.K"),
+                call("loops.shed_known", **_ROW, L_p="other.L", l_p="other.known"),
+                ForEach(
+                    of="seconds",
+                    steps=(
+                        call("loops.shed_pair", inverse="row.inverse", L_p="other.L",
+                             L_q="second.L", L_pq="both.L"),
+                    ),
+                ),
+            ),
+        ),
+    ),
+)  # fmt: skip
+
+ROW_FOUND = Pass(
+    "row_found", "row", "The multiplier of a row, from the motion of the body where it closes.",
+    (
+        call("loops.multiplier", **_ROW, x="row.x"),
+        call("loops.multiplier_more", when="inside", **_COLUMN, delta="meeting.delta", x="row.x"),
+        ForEach(
+            of="others",
+            steps=(
+                call("loops.multiplier_less", inverse="row.inverse", L_p="other.L",
+                     x_p="other.x", x="row.x"),
+            ),
+        ),
+    ),
+    order=TIPS_TO_ROOT,
+)  # fmt: skip
+
+UNLOADED = Pass(
+    "unloaded", "body", "No load and no effort: the rows alone are to be met.",
+    (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),
+)  # fmt: skip
+
+#: Modes eliminated from the rows that pass or end at a flexible body, behind S and e.
+_ROWS_CONDENSED = ForEach(
+    of="bent",
+    steps=(
+        call("modal.row_felt", when="section", H="section.H", K="bent.K", K_f="bent.modes"),
+        call("modal.row_condensed", S_ff="modes.S_ff", K_f="bent.modes", Gg="modes.gain",
+             work="modes.work", Y="bent.y", K="bent.K", l="bent.known"),
+        ForEach(
+            of="bent_before",
+            steps=(
+                call("modal.row_coupled", K_f="bent_before.modes", Y="bent.y",
+                     L_ij="bent_pair.L"),
+            ),
+        ),
+    ),
+)  # fmt: skip
+_MODES_ANSWERED = (
+    call("modal.recover", Gg="modes.gain", delta_I="body.delta", etadd="modes.etadd"),
+    ForEach(
+        of="bent",
+        steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),),
+    ),
+    Copy(to="modes.udot", source="modes.etadd"),
+    Add(to="modes.udot", source="modes.given", when="refined"),
+)
+
+_ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}
+
+#: How a row's column, moved by the hinge, is coupled with the load and with other columns.
+_COUPLED = only(
+    "moving",
+    call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
+    call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
+    ForEach(
+        of="before",
+        steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),),
+    ),
+)
+
+
+def _felt(load: str, effort: str, rest: str) -> Call:
+    """What is left of an effort by a load, where the hinge's speeds are eliminated."""
+    return call("generic{free}.push", when="moving", Rc="identity", r="zero", H="hinge.H_free",
+                G="zero", e=load, tau=effort, y=rest)  # fmt: skip
+
+
+def _pushed(when: str, load: str, effort: str, rest: str, onward: str) -> tuple[Call, ...]:
+    """A load carried on, or felt alone by a hinge on the ground, which takes what comes."""
+    felt = {"e": load, "tau": effort, "y": rest}
+    return (
+        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_ACROSS, **felt,
+             e_I=onward),
+        call("generic{free}.push_on_ground", when=f"{when} moving !hung".strip(),
+             H="hinge.H_free", **felt),
+    )  # fmt: skip
+
+
+#: A column at an end of a flexible body is felt by its modes.
+_FELT_BY_MODES = call("modal.row_felt", when="outward", H="section.H", K="pending.K",
+                      K_f="pending.modes")  # fmt: skip
+
+_ALONE = only(
+    "!staged",
+    call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
+         J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
+         G="hinge.G", S_I="parent.S"),
+    *_pushed("", "body.e", "hinge.tau_free", "hinge.g", "parent.e"),
+    ForEach(
+        of="pending",
+        steps=(
+            _FELT_BY_MODES,
+            *_pushed("!coupled", "pending.K", "zero", "pending.y", "pending.onward"),
+            *only(
+                "coupled",
+                SelectColumns(to="local.tau", source="pending.tau"),
+                *_pushed("", "pending.K", "local.tau", "pending.y", "pending.onward"),
+                replace(TOLD, when=""),
+            ),
+            *_COUPLED,
+        ),
+    ),
+)  # fmt: skip
+_BY_STAGES = only(
+    "staged",
+    *condensed("body.e"),
+    _felt("local.e", "hinge.tau_free", "hinge.g"),
+    *eliminate_with_effort("hinge.tau_free", "hinge.z"),
+    JUDGED,
+    *ONWARD,
+    *HANDED_ON,
+    ForEach(
+        of="pending",
+        steps=(
+            _FELT_BY_MODES,
+            *condensed("pending.K"),
+            *only(
+                "!coupled",
+                _felt("local.e", "zero", "pending.y"),
+                *eliminate_with_effort("zero", "pending.z"),
+            ),
+            *only(
+                "coupled",
+                SelectColumns(to="local.tau", source="pending.tau"),
+                _felt("local.e", "local.tau", "pending.y"),
+                *eliminate_with_effort("local.tau", "pending.z"),
+                replace(TOLD, when=""),
+                replace(TOLD_OF_BIAS, when="!corrected"),
+            ),
+            *ONWARD,
+            Add(to="pending.onward", source="local.e", when="hung"),
+            *_COUPLED,
+        ),
+    ),
+)
+
+
+CARRIED = Pass(
+    "carried", "body", "S, e and the columns of open rows carried across the hinge to the parent.",
+    (
+        *only("modal", RunPass(whole=MODAL_CONDENSE), _ROWS_CONDENSED),
+        ForEach(of="closings", steps=(RunPass(whole=ROW_CLOSED),)),
+        *only("outward", ABSORBED),
+        *FREE,
+        efforts_of("pending.told", "refined"),
+        FREE_EFFORTS,
+        *_ALONE,
+        *_BY_STAGES,
+    ),
+    order=TIPS_TO_ROOT, skip="aside",
+)  # fmt: skip
+
+
+def _pulled(column: str, offset: str) -> ForEach:
+    """Efforts that the multipliers of open rows add."""
+    return ForEach(
+        of="pending",
+        steps=(
+            call("generic{free}.pull", when="moving", y=column, x="pending.x", y_0=offset),
+            call("loops.loaded", when="kept", K="pending.K", x="pending.x", e="body.e"),
+        ),
+    )
+
+
+ANSWERED = Pass(
+    "answered", "body", "Accelerations of a hinge under the multipliers of its open rows.",
+    (
+        *only(
+            "!staged",
+            _pulled("pending.y", "hinge.g"),
+            call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
+                 delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+        ),
+        *only("staged", _pulled("pending.z", "hinge.z"), *RECOVERED),
+        efforts_of("pending.x", "kept"),
+        ScatterSpeeds(to="body.udot", free="hinge.rates", imposed="body.s", when="!refined"),
+        *only(
+            "refined",
+            ScatterSpeeds(to="body.udot", free="hinge.rates"),
+            Add(to="body.udot", source="body.s"),
+        ),
+        Add(to="body.udot", source="body.chosen", when="staged !corrected"),
+        ForEach(of="openings", steps=(RunPass(whole=ROW_FOUND),)),
+        *only("modal", *_MODES_ANSWERED),
+        *only("section", *DISPLACED),
+        # The elimination lay where H was.
+        RunPass(whole=HINGE_MOTION, when="!staged imposed balance"),
+    ),
+    skip="aside",
+)  # fmt: skip
+
+CLOSURES_ANSWERED = Pass(
+    "closures_answered", "body", "Accelerations and load of a hinge that closes a loop.",
+    (
+        Copy(to="body.udot", source="body.s"),
+        Add(to="body.udot", source="body.chosen", when="staged !corrected"),
+        EachSpeed(
+            steps=(
+                call("loops.told", J_A="closure.J_A[6 * k]", J_B="closure.J_B[6 * k]",
+                     l="closure.l[k]", delta_A="parent.delta", delta_B="outboard.delta",
+                     c="local.along"),
+                Add(to="body.udot[k]", source="local.along"),
+            ),
+        ),
+        ForEach(of="rows", when="refined", steps=(Add(to="line.x", source="line.told"),)),
+        *only(
+            "kept",
+            efforts_of_own("own.x", ""),
+            Copy(to="body.e"),
+            Copy(to="body.delta", when="staged"),  # what has no mass asks for none
+            EachSpeed(
+                steps=(call("loops.loaded", K="closure.W[6 * k]", x="body.tau[k]", e="body.e"),),
+            ),
+            ForEach(
+                of="rows",
+                steps=(call("loops.act", J="closure.W[6 * c]", tau="line.x", e="body.e"),),
+            ),
+        ),
+    ),
+    skip="!cut",
+)  # fmt: skip

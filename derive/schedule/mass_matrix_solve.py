@@ -1,0 +1,63 @@
+"""M^-1 times columns: S factored once, then one load from tips to root and back for each column."""
+
+from __future__ import annotations
+
+from .flexible import ABSORBED, DISPLACED, FELT, MODAL_CONDENSE
+from .forward_kinematics import HINGE_MOTION
+from .pass_steps import TIPS_TO_ROOT, Add, Copy, Pass, RunPass, ScatterSpeeds, call, only
+from .riccati_sweep import BODY, FREE, FREE_EFFORTS
+
+FACTORISE = Pass(
+    "factorise", "body", "Mass matrices carried to the root; what each elimination leaves is kept.",
+    (
+        RunPass(whole=HINGE_MOTION, when="own"),
+        # Loads are carried along unread: columns start from none.
+        RunPass(whole=MODAL_CONDENSE, when="modal"),
+        *only("outward", ABSORBED),
+        *FREE,
+        call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
+             J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
+             G="hinge.G", S_I="parent.S"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+COLUMN = Pass(
+    "column", "body", "One column as efforts, and no load yet.",
+    (
+        Copy(to="body.e"),
+        Copy(to="body.tau", source="body.column"),
+        *only("modal", Copy(to="modes.e_f"),
+              Add(to="modes.e_f", source="modes.column", times=-1)),
+    ),
+)  # fmt: skip
+
+COLUMN_CARRIED = Pass(
+    "column_carried", "body", "The column's load carried across the hinge to the parent.",
+    (
+        *only("modal section", *FELT),
+        *only("modal", call("modal.pushed", Gg="modes.gain", e="body.e", e_f="modes.e_f",
+                            e_c="local.e_c"),
+              Copy(to="body.e", source="local.e_c")),
+        *only("outward", *FELT),
+        FREE_EFFORTS,
+        call("generic{free}.push", **BODY, H="hinge.H_free", G="hinge.G", e="body.e",
+             tau="hinge.tau_free", y="hinge.g", e_I="parent.e"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+COLUMN_ANSWERED = Pass(
+    "column_answered", "body", "Accelerations that answer the column.",
+    (
+        call("generic{free}.answer", **BODY, H="hinge.H_free", F="hinge.F", G="hinge.G",
+             y="hinge.g", delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
+        ScatterSpeeds(to="body.answer", free="hinge.rates"),
+        *only("modal", call("modal.answer", S_ff="modes.S_ff", e_f="modes.e_f", Gg="modes.gain",
+                            delta_I="body.delta", y="modes.felt", etadd="modes.etadd",
+                            work="modes.work"),
+              Copy(to="modes.answer", source="modes.etadd")),
+        *only("section", *DISPLACED),
+    ),
+    skip="idle",
+)  # fmt: skip

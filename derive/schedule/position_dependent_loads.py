@@ -1,0 +1,190 @@
+"""Loads that change with the place of their body, in the tangent (derive/equations/tangent_placed).
+
+These steps go between those of `tangent`, for every body that leads to such a load: one in the axes
+of space, a force element to the ground, drag.  The rows that a load's body starts from come of the
+differentiated passes of the loads themselves, along every entry of the body's place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .differentiated_passes import D, differentiate_call, differentiate_pass, slopes
+from .flexible import DRAG
+from .loads import FORCES, LOADS
+from .pass_steps import (
+    Add,
+    Call,
+    Copy,
+    Evaluate,
+    ForEachDirection,
+    Gather,
+    Move,
+    Pass,
+    RunPass,
+    Step,
+    call,
+    only,
+)
+
+_POSED = call("frames.placed_pose", A="body.A", p="place.z", d_A=D + "body.A", d_x=D + "body.x",
+              d_v=D + "body.v")  # fmt: skip
+_STILL = (Copy(to=D + "body.A"), Copy(to=D + "body.x"), Copy(to=D + "body.v"))
+
+#: Nothing moves yet, and nothing is known of loads by place.
+BEGUN = only("placed", Copy(to="place.S"), *_STILL, Copy(to=D + "body.motion"))
+
+
+def _added(to: str, *steps: Step) -> tuple[Step, ...]:
+    """What steps add to the body's load along direction c, in a row for it."""
+    return (
+        Move(to=D + "body.e", source=f"{to}[6 * c]", count="6"),
+        *steps,
+        Move(to=f"{to}[6 * c]", source=D + "body.e", count="6"),
+    )
+
+
+def _along(entries: str, *steps: Step) -> tuple[Step, ...]:
+    """Steps for entries of the body's place, which stays as it is behind them."""
+    return (ForEachDirection(of=entries, steps=(_POSED, *steps)), *_STILL)
+
+
+#: Drag by motion and modes joins the body's own load.
+DRAGGED = RunPass(whole=differentiate_pass(DRAG), when="drag")
+#: Drag along the place of a flexible body, zero without.
+OWN_BY_PLACE = only(
+    "modal placed",
+    *_along(
+        "place",
+        Copy(to=D + "body.e"),
+        Copy(to=D + "modes.e_f"),
+        DRAGGED,
+        Move(to="place.S[6 * c]", source=D + "body.e", count="6"),
+        Move(to="bend.place_Z[n * c]", source=D + "modes.e_f", count="n"),
+    ),
+)
+
+_APPLIED = next(
+    step for step in LOADS.steps
+    if isinstance(step, Call) and step.kernel == "frames.applied_load"
+)  # fmt: skip
+#: What makes the numbers that it is applied with.
+_TAKEN = LOADS.steps[: LOADS.steps.index(_APPLIED)]
+
+LOADS_BY_PLACE = Pass(
+    "loads_by_place", "load", "Change of a load in the axes of space as its body turns.",
+    (
+        *_TAKEN,
+        *_along("turn", *_added("place.S", differentiate_call(_APPLIED, "A_F", "F", "M"))),
+    ),
+    skip="!own_load",
+)  # fmt: skip
+
+
+def _moves(step: Step) -> bool:
+    """Whether a step of a differentiated pass makes a derivative."""
+    if isinstance(step, Call):
+        return type(step) is not Call
+    return isinstance(step, (Copy, Add, Gather, Evaluate)) and step.to.startswith(D)
+
+
+def _of_its_end(step: Step) -> Step:
+    """A step about one end alone, where that end is not on the ground."""
+    slots = [slot for _, slot in step.ports] if isinstance(step, Call) else []
+    for role in ("from", "to"):
+        if any(slot.startswith(f"{role}.") for slot in slots):
+            return replace(step, when=f"{role}_body")
+    return step
+
+
+_FORCE = tuple(slopes(FORCES.steps))
+_FORCE_MOVED = tuple(map(_of_its_end, filter(_moves, _FORCE)))
+#: What is known of the end on the ground.
+_GROUNDED = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
+
+FORCES_BY_PLACE = Pass(
+    "forces_by_place", "force", "Change of an element to the ground as its body moves.",
+    (
+        *(step for step in _FORCE if not _moves(step)),
+        *_GROUNDED,
+        *_along("place", *_added("place.S", *_FORCE_MOVED)),
+        ForEachDirection(of="spin", steps=_added("tangent.S", *_FORCE_MOVED)),
+    ),
+    skip="!own_force",
+)  # fmt: skip
+
+
+# --- factored -----------------------------------------------------------------------------------
+
+
+def column(b: str, d_v: str) -> Step:
+    """A direction's row of B_p."""
+    return call("frames.placed_column", when="placed", theta="local.turn", x="local.shift",
+                v_P="body.v", v="hinge.v", d_v=d_v, Q="local.carrier", B_p=b)  # fmt: skip
+
+
+_SP = {"S_p": "place.S"}
+_ROWS = {"Z_p": "local.placed"}
+HINGE_ROWS = only(
+    "moving placed",
+    call("tangent.placed_rows", n="free", H="tangent.H", **_SP, **_ROWS),
+    call("tangent.placed_own", n="free", B_p="place.B", **_SP, **_ROWS, K="tangent.G",
+         Z_x="tangent.W"),
+)  # fmt: skip
+HINGE_REDUCED = only(
+    "moving placed",
+    call("tangent.placed_reduce", n="free", inverse="tangent.inverse", **_ROWS, V="tangent.V",
+         gain="place.gain", **_SP),
+)  # fmt: skip
+MODES_OWN = only(
+    "modal section placed",
+    call("tangent.placed_own", n="modes", B_p="bend.place_B", **_SP, Z_p="bend.place_Z",
+         K="bend.K", Z_x="bend.Z_x"),
+)  # fmt: skip
+
+
+def _node(condition: str, subspace: str) -> Step:
+    return call("tangent.placed_node", n="modes", when=condition, H=subspace, V="bend.V",
+                D="bend.D", **_SP, Z_p="bend.place_Z", right="bend.place_right",
+                gain="bend.place_gain", S_c="local.S_p", work="bend.work")  # fmt: skip
+
+
+MODES_REDUCED = (
+    _node("modal section placed", "section.H"),
+    _node("modal !section placed", "bend.still"),
+    *only("modal placed", Copy(to="place.S", source="local.S_p")),
+)
+_AT = {"Rc": "body.R", "r": "body.r"}
+CARRIED = call("frames.placed_carry", when="placed", **_AT, **_SP, T_p="local.T_p",
+               T_w="local.T", S_pI="inboard.place", S_wI="inboard.S")  # fmt: skip
+ABSORBED = call("tangent.placed_absorb", n="modes", when="outward placed", **_AT, H="section.H",
+                B_p="port.place_B", **_SP, T_p="local.T_p", K="bend.K", Z_p="bend.place_Z",
+                Z_x="bend.Z_x")  # fmt: skip
+
+# --- one right-hand side ------------------------------------------------------------------------
+
+KNOWN = call("frames.placed_known", when="placed", **_SP, b_p="place.known", e_S="local.seen",
+             e_b="local.known")  # fmt: skip
+MOVED = call("frames.placed_moved", when="placed", **_AT, z_I=D + "parent.motion",
+             p_I="inboard.z", p="place.z")  # fmt: skip
+KNOWN_MOVED = Add(to="place.z", source="place.known")
+
+
+def _displaced(size: str, b: str, unknowns: str) -> tuple[Step, ...]:
+    return (
+        call("tangent.displaced", n=size, B=b, x=unknowns, z_c="place.z", z="local.p"),
+        Copy(to="place.z", source="local.p"),
+    )
+
+
+HINGE_LEFT = only(
+    "moving placed",
+    call("tangent.placed_left", n="free", gain="place.gain", p="place.z", y="tangent.y"),
+)
+HINGE_DISPLACED = only("moving placed", *_displaced("free", "place.B", "local.x"))
+PORT_DISPLACED = only("outward placed", *_displaced("modes", "port.place_B", "modes.answer"))
+MODES_LEFT = only(
+    "modal placed",
+    call("tangent.placed_left", n="modes", gain="bend.place_gain", p="place.z", y="bend.y"),
+)
+MODES_DISPLACED = only("modal section placed", *_displaced("modes", "bend.place_B", "modes.answer"))

@@ -1,0 +1,46 @@
+"""The sweep as least squares, in place of `condense`: rows U, d and loads e from tips to root.
+
+It keeps digits where heavy bodies hang behind light ones.  Rows lie where S does, and what they
+take where deviations will; whoever reads S and e behind the sweep finds them made of the rows
+again.  The way back is that of the other sweep, by the same gains.
+"""
+
+from __future__ import annotations
+
+from .forward_kinematics import HINGE_MOTION
+from .pass_steps import TIPS_TO_ROOT, Copy, Pass, RunPass, call
+from .riccati_sweep import FREE, FREE_EFFORTS
+
+QR_OWN = Pass(
+    "qr_own", "body", "Rows of a body alone, and in them its load at the bias motion.",
+    (
+        RunPass(whole=HINGE_MOTION, when="own"),
+        call("qr.factor", S="body.S", U="local.U"),
+        Copy(to="body.U", source="local.U"),
+        call("qr.bias", when="rigid", U="body.U", motion="body.motion", d="body.d", e="body.e"),
+        Copy(to="body.d", when="!rigid"),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+_ROWS = {"U": "body.U", "d": "body.d", "e": "body.e"}
+_BEHIND = {"V": "local.V", "d_V": "local.d_V", "e_Q": "local.e_Q"}
+
+QR_CONDENSE = Pass(
+    "qr_condense", "body", "Rows of a body, complete, carried across its hinge to the parent.",
+    (
+        *FREE,
+        FREE_EFFORTS,
+        call("generic{free}.qr_eliminate", fails="undetermined", H="hinge.H_free",
+             J="hinge.J_free", floor="body.floor", **_ROWS, tau="hinge.tau_free", G="hinge.G",
+             g="hinge.g", **_BEHIND),
+        call("qr.merge", when="hung", Rc="body.R", r="body.r", **_BEHIND, U_P="parent.U",
+             d_P="parent.d", U="local.U", d="local.d", e_I="parent.e"),
+        Copy(to="parent.U", source="local.U", when="hung"),
+        Copy(to="parent.d", source="local.d", when="hung"),
+        call("qr.restored", when="kept", **_ROWS, S="local.S", e_S="local.e_S"),
+        Copy(to="body.S", source="local.S", when="kept"),
+        Copy(to="body.e", source="local.e_S", when="kept"),
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip

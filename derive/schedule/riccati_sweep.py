@@ -1,0 +1,179 @@
+"""The Riccati sweep: S and e from tips to root, accelerations from root to tips."""
+
+from __future__ import annotations
+
+from .flexible import ABSORBED, DISPLACED, MODAL_CONDENSE
+from .pass_steps import (
+    TIPS_TO_ROOT,
+    Add,
+    ByScrew,
+    CheckPivots,
+    Copy,
+    Pass,
+    RunPass,
+    ScatterSpeeds,
+    SelectColumns,
+    Step,
+    call,
+    only,
+)
+
+BODY = {"Rc": "body.R", "r": "body.r"}
+COORDINATES = {"p": "hinge.p", "q": "body.q"}
+_CARRIED = {"S": "local.S", "e": "local.e"}
+_ONWARD = {"S_I": "local.S", "e_I": "local.e"}
+_NO_SPEEDS = {"H": "none", "J": "none", "floor": "zero", "tau": "none"}
+
+#: The columns of H and the rotor inertia of the speeds that nobody imposes, and their efforts.
+FREE = (
+    SelectColumns(to="hinge.H_free", source="hinge.H", rows=6),
+    SelectColumns(to="hinge.J_free", source="body.rotor"),
+)
+FREE_EFFORTS = SelectColumns(to="hinge.tau_free", source="body.tau")
+
+
+def _transported(rotation: str, place: str) -> tuple[Step, ...]:
+    """S and e by the plain products; the kernel adds to what is there."""
+    return (
+        Copy(to="local.S_I"),
+        Copy(to="local.e_I"),
+        call("generic0.condense", Rc=rotation, r=place, **_NO_SPEEDS, **_CARRIED,
+             S_I="local.S_I", e_I="local.e_I"),
+        Copy(to="local.S", source="local.S_I"),
+        Copy(to="local.e", source="local.e_I"),
+    )  # fmt: skip
+
+
+def transport(stage: str, place: str, when: str) -> Step:
+    """S and e across one stage, by the cheapest kernel that what is known of it allows.
+
+    S is carried across a screw by plain products: the double angle costs fewer operations, but
+    takes the small moments behind a long chain from differences of large ones.
+    """
+    rotation = f"{stage}.R"
+
+    def screw(axis: str, turn: str, along: int) -> tuple[Step, ...]:
+        return (
+            call(f"screw.condense_{axis}", turn=f"{rotation}[{turn}]", d=f"{place}[{along}]",
+                 **_CARRIED, **_ONWARD),
+        )  # fmt: skip
+
+    return ByScrew(
+        rotation=rotation, position=place, when=when,
+        about_x=screw("x", "4 7", 0),
+        about_z=screw("z", "0 3", 2),
+        turning=(
+            call("screw.condense_turn_by_trace", Rc=rotation, **_CARRIED, **_ONWARD),
+            *_transported("identity", place),
+        ),
+        otherwise=_transported(rotation, place),
+    )  # fmt: skip
+
+
+#: Elimination apart from the transport.  Behind a screw about z that leaves H as it is, it is done
+#: in inboard axes, which takes the turn out of the chain of divisions.
+_ELIMINATED = {
+    **_CARRIED, "F": "hinge.F", "Z": "hinge.Z", "W": "hinge.W", "S_Q": "local.S",
+    "e_Q": "local.e", "D_ii": "local.pivots",
+}  # fmt: skip
+
+
+def condensed(load: str) -> tuple[Step, ...]:
+    """S and a load where the hinge's free speeds are eliminated."""
+    return (
+        Copy(to="local.S", source="body.S"),
+        Copy(to="local.e", source=load),
+        transport("hinge", "hinge.d", when="axial"),
+    )
+
+
+def eliminate_with_effort(effort: str, offset: str) -> tuple[Step, ...]:
+    """S and a load without the hinge's free speeds, on which an effort acts."""
+    ports = {**_ELIMINATED, "tau": effort, "z": offset}
+    return (
+        call("hinge.eliminate", when="free special", fails="undetermined", **COORDINATES, **ports),
+        call("generic{free}.eliminate", when="free !special", fails="undetermined",
+             H="hinge.H_free", J="hinge.J_free", **ports),
+    )  # fmt: skip
+
+
+#: To the parent, where it is a body.
+ONWARD = (
+    transport("hinge", "hinge.d", when="hung !axial"),
+    transport("connection", "connection.r", when="hung"),
+)
+JUDGED = CheckPivots(
+    pivots="local.pivots", subspace="hinge.H_free", own="body.own", whole="body.S",
+    fails="undetermined", when="free",
+)  # fmt: skip
+HANDED_ON = (
+    Add(to="parent.S", source="local.S", when="hung"),
+    Add(to="parent.e", source="local.e", when="hung"),
+)
+_BY_STAGES = only(
+    "staged",
+    *condensed("body.e"),
+    *eliminate_with_effort("hinge.tau_free", "hinge.z"),
+    JUDGED,
+    *ONWARD,
+    *HANDED_ON,
+)
+
+_GAINS = {"G": "hinge.G", "g": "hinge.g"}
+_OWN = {"floor": "body.floor", "S": "body.S", "e": "body.e"}
+_PARENT = {"S_I": "parent.S", "e_I": "parent.e"}
+
+CONDENSE = Pass(
+    "condense", "body", "S and e of a body, complete, carried across its hinge to the parent.",
+    (
+        RunPass(whole=MODAL_CONDENSE, when="modal"),
+        *only("outward", ABSORBED),
+        *only("parts", *FREE, FREE_EFFORTS),
+        call("hinge.condense", when="own", fails="undetermined", **BODY, **COORDINATES, **_OWN,
+             tau="body.tau", **_GAINS, **_PARENT),
+        call("generic{free}.condense", when="parts !staged", fails="undetermined", **BODY,
+             H="hinge.H_free", J="hinge.J_free", **_OWN, tau="hinge.tau_free", **_GAINS,
+             **_PARENT),
+        *_BY_STAGES,
+    ),
+    order=TIPS_TO_ROOT, skip="idle",
+)  # fmt: skip
+
+_FACTORED = {"H": "hinge.H_free", "F": "hinge.F", "Z": "hinge.Z", "z": "hinge.z", "W": "hinge.W"}
+_RATES = {"udot": "hinge.rates"}
+_STILL = {"H": "none", "G": "none", "g": "none"}
+
+#: Behind `eliminate_with_effort`, stage by stage.
+RECOVERED = (
+    call("generic0.recover", Rc="connection.R", r="connection.r", **_STILL,
+         delta_I="parent.delta", delta="local.delta"),
+    call("generic{free}.recover_factored", when="free axial", Rc="identity", r="zero",
+         **_FACTORED, delta_I="local.delta", **_RATES, delta="local.delta"),
+    call("generic0.recover", when="free axial", Rc="hinge.R", r="hinge.d", **_STILL,
+         delta_I="local.delta", delta="body.delta"),
+    call("generic{free}.recover_factored", when="free !axial", Rc="hinge.R", r="hinge.d",
+         **_FACTORED, delta_I="local.delta", **_RATES, delta="body.delta"),
+    call("generic0.recover", when="!free", Rc="hinge.R", r="hinge.d", **_STILL,
+         delta_I="local.delta", delta="body.delta"),
+)  # fmt: skip
+
+RECOVER = Pass(
+    "recover", "body", "Accelerations of a hinge and deviation of the body from its bias motion.",
+    (
+        call("hinge.recover", when="own", **BODY, **COORDINATES, **_GAINS,
+             delta_I="parent.delta", udot="body.udot", delta="body.delta"),
+        call("generic{free}.recover", when="parts !staged", **BODY, H="hinge.H_free", **_GAINS,
+             delta_I="parent.delta", **_RATES, delta="body.delta"),
+        *only("staged", *RECOVERED),
+        ScatterSpeeds(to="body.udot", free="hinge.rates", imposed="body.s", when="parts !refined"),
+        ScatterSpeeds(to="body.udot", free="hinge.rates", when="parts refined"),
+        Add(to="body.udot", source="body.s", when="refined"),
+        Add(to="body.udot", source="body.chosen", when="staged"),
+        call("modal.recover", when="modal", Gg="modes.gain", delta_I="body.delta",
+             etadd="modes.etadd"),
+        Copy(to="modes.udot", source="modes.etadd", when="modal"),
+        Add(to="modes.udot", source="modes.given", when="modal refined"),
+        *only("section", *DISPLACED),
+    ),
+    skip="idle", given=("parent.delta",),
+)  # fmt: skip

@@ -1,0 +1,613 @@
+"""The tangent of inverse dynamics: its derivative along one direction, and all of it factored.
+
+`DIRECTIONAL` is inverse dynamics differentiated along a direction.  The other sweeps eliminate the
+unknowns of an implicit step (derive/equations/tangent_sweep.py): along each unknown the motion of
+its body, and what it makes of the load that is carried, come from the same differentiated passes,
+run for that body alone with its parent at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from . import position_dependent_loads
+from .couplings import COUPLINGS_LOADED
+from .differentiated_passes import (
+    SLOPE,
+    D,
+    DifferentiatedCall,
+    differentiate_call,
+    differentiate_pass,
+)
+from .flexible import DRAG, MODAL_OWN, SECTION_MOTION
+from .forward_kinematics import (
+    BODY,
+    CONNECTION,
+    COORDINATES,
+    DRIVES,
+    FORWARD,
+    HINGE,
+    POSES,
+    PRESCRIBED,
+)
+from .inverse_dynamics import REQUIRED
+from .loads import EFFORTS, FORCES, LAWS, LOADS
+from .loop_closure import CLOSURES_LOADED
+from .pass_steps import (
+    TIPS_TO_ROOT,
+    Add,
+    Call,
+    Copy,
+    ForEachDirection,
+    Move,
+    Pass,
+    Run,
+    RunPass,
+    ScatterSpeeds,
+    SelectColumns,
+    Step,
+    Sweep,
+    call,
+    elsewhere,
+    only,
+)
+
+#: Relative motion across any hinge, and the body behind it.  Inverse dynamics has left the motion
+#: of every hinge in its slots, so that one way across serves all of them.
+_HINGE_MOTION = Pass(
+    "hinge_motion", "body", "Relative motion across the hinge.",
+    (call("hinge.hinge", **COORDINATES, **HINGE, qdot="body.qdot"),),
+)  # fmt: skip
+#: Its derivative, as other sweeps do it too.
+HINGE_CHANGE = differentiate_pass(_HINGE_MOTION)
+#: The same where nobody asks for it behind the steps that follow.
+_CHANGED = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
+_CHANGE = elsewhere(HINGE_CHANGE, "", _CHANGED).steps
+_ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
+               motion_I="parent.motion", **BODY)  # fmt: skip
+_FORWARD = Pass(
+    FORWARD.name, "body", FORWARD.purpose,
+    (
+        RunPass(whole=SECTION_MOTION, when="section"),
+        RunPass(whole=_HINGE_MOTION, when="!section"),
+        _ACROSS,
+        RunPass(whole=MODAL_OWN, when="modal"),
+        call("body.bias_load", when="!modal", p="body.p", motion="body.motion", e="body.e"),
+    ),
+    skip=FORWARD.skip,
+)  # fmt: skip
+
+
+def _without_hinges(whole: Pass) -> Pass:
+    """Hinges have their motion already."""
+    steps = (step for step in whole.steps if not isinstance(step, RunPass))
+    return replace(whole, steps=tuple(steps))
+
+
+_MOVED_ALONG = (
+    Run(whole=differentiate_pass(PRESCRIBED)),
+    Run(hook="drive_slopes", when="driven"),
+    Run(whole=differentiate_pass(DRIVES), when="driven"),
+    Run(hook="expression_slopes", when="valued"),
+    Run(whole=differentiate_pass(_FORWARD)),
+)
+_POSED = Run(whole=differentiate_pass(_without_hinges(POSES)), when="posed")
+_ACTING = (
+    Run(whole=differentiate_pass(DRAG), when="posed flexible"),
+    Run(whole=differentiate_pass(LOADS), when="posed"),
+    Run(whole=differentiate_pass(FORCES), when="posed"),
+)
+_COUPLED = (
+    Run(hook="coupling_slopes", when="couplings"),
+    Run(whole=differentiate_pass(COUPLINGS_LOADED), when="couplings"),
+)
+_CLOSED = Run(whole=differentiate_pass(_without_hinges(CLOSURES_LOADED)), when="looped")
+DIRECTIONAL = Sweep(
+    "required_slope", "Derivative of the efforts that given accelerations need.",
+    (
+        *_MOVED_ALONG,
+        Run(whole=differentiate_pass(EFFORTS)),
+        Run(whole=differentiate_pass(LAWS)),
+        *_COUPLED,
+        _POSED,
+        *_ACTING,
+        _CLOSED,
+        Run(whole=differentiate_pass(_without_hinges(REQUIRED))),
+    ),
+)  # fmt: skip
+
+_NO_LOADS = Pass("no_loads", "body", "Loads begun from none.", (Copy(to=D + "body.e"),))
+
+
+def _across(whole: Pass, own: str) -> Run:
+    """Without what the elimination sees."""
+    return Run(
+        whole=replace(differentiate_pass(whole), name=f"{whole.name}_across", skip=own),
+        when="posed",
+    )
+
+
+#: What acts on a body by what others do: springs between bodies, loads in axes of other bodies, the
+#: values of expressions and hinges that close loops reach across the tree, so that the elimination
+#: does not see them.
+APPLIED_SLOPE = Sweep(
+    "applied_slope",
+    "Derivative of what acts across the tree, and of the values of expressions.",
+    (
+        *_MOVED_ALONG,
+        _POSED,
+        Run(whole=_NO_LOADS, when="posed"),
+        _across(LOADS, "own_load"),
+        _across(FORCES, "own_force"),
+        Run(whole=differentiate_pass(EFFORTS), when="looped"),
+        *_COUPLED,
+        # In the tree the elimination sees them.
+        Run(
+            whole=replace(differentiate_pass(LAWS), name="laws_across", skip="!shut"), when="looped"
+        ),
+        _CLOSED,
+    ),
+)
+
+
+# --- along the unknowns of one body -------------------------------------------------------------
+
+
+#: What the derivatives of a hinge or of a section are made into, and the numbers that go with them.
+_ACROSS_NOW = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
+_CARRIER = call("generic{nu}.tangent_carrier", **_ACROSS_NOW, s="body.s", c="hinge.c",
+                motion="body.motion", Q="local.carrier")  # fmt: skip
+_TURNED = {"theta": "local.turn", "x": "local.shift"}
+
+
+def _turn(change: Callable[[str], str]) -> Call:
+    return call("frames.tangent_turned", R="hinge.R", d_R=change("R"), d_d=change("d"), **_TURNED)
+
+
+def _column(b: str, g: str, laws: str) -> dict[str, str]:
+    """A direction's row of B and of G, and what the hinge's rows change by."""
+    return {
+        **_TURNED, **_ACROSS_NOW, "Q": "local.carrier", "f": "body.e", "d_s": D + "body.given",
+        "J": "body.rotor", "laws": laws, "B": b, "G": g, "row": "local.change",
+    }  # fmt: skip
+
+
+def _of_section(name: str) -> str:
+    return f"{D}hinge.{name}"
+
+
+def _of_hinge(name: str) -> str:
+    return D + _CHANGED[f"hinge.{name}"]
+
+
+def _changes(change: Callable[[str], str]) -> dict[str, str]:
+    return {"s": "body.s"} | {f"d_{name}": change(name) for name in ("H", "v", "w", "c")}
+
+
+def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
+    """Where the derivatives of modes point: of a section and, in d:modes.felt, of the rows."""
+    felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
+                tau="modes.felt")  # fmt: skip
+    return (
+        RunPass(whole=differentiate_pass(SECTION_MOTION)),
+        _turn(_of_section),
+        call("generic{nu}.tangent_column", **_column(b, g, "none"), **_changes(_of_section)),
+        position_dependent_loads.column(b_p, _of_section("v")),
+        differentiate_call(felt, "e"),
+    )
+
+
+def _section(matrices: str) -> tuple[Step, ...]:
+    """A section has no speeds: its rows are those of the modes."""
+    return (
+        _CARRIER,
+        ForEachDirection(
+            of="modes",
+            steps=(
+                Copy(to=D + "modes.e_f"),
+                *_along_modes(
+                    f"{matrices}.B[9 * c]", f"{matrices}.G[6 * c]", f"{matrices}.place_B[9 * c]"
+                ),
+                Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
+            ),
+        ),
+    )
+
+
+def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
+    """Where the derivatives of a hinge point; its rows in local.change."""
+    column = _column(b, g, laws)
+    turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
+    return (
+        *only("!steady", *_CHANGE),
+        *only("steady curved", *_CHANGE),
+        *only("steady !curved placed", *_CHANGE),
+        call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
+             **_TURNED),
+        replace(_turn(_of_hinge), when="curved"),
+        call("generic{nu}.tangent_turning", when="turning", **turning, d_u=D + "body.u"),
+        call("generic{nu}.tangent_steady", when="steady !turning", **column, d_u=D + "body.u"),
+        call("generic{nu}.tangent_column", when="!steady", **column, **_changes(_of_hinge)),
+        position_dependent_loads.column(b_p, _of_hinge("v")),
+    )  # fmt: skip
+
+
+_HINGE = (
+    call("hinge.directions", when="directed", **COORDINATES, s="body.s", motion="body.motion",
+         f="body.e", J="body.rotor", laws="tangent.laws", along="tangent.along", rate="step.rate",
+         scale="step.s", sq="step.q", **{name: f"tangent.{name}" for name in "BGWH"}),
+    *only(
+        "!directed",
+        _CARRIER,
+        ForEachDirection(
+            of="free",
+            steps=(
+                *_along_hinge(
+                    "tangent.B[9 * c]", "tangent.G[6 * c]", "place.B[9 * c]",
+                    "tangent.laws[nu * c]",
+                ),
+                SelectColumns(to="tangent.W[speeds * c]", source="local.change"),
+            ),
+        ),
+        SelectColumns(to="tangent.H", source="hinge.H", rows=6),
+    ),
+)  # fmt: skip
+
+LAG = Pass(
+    "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
+    (
+        call("hinge.rates_by_coordinates", **COORDINATES, J="tangent.turns"),
+        call("hinge.rates_by_speeds", **COORDINATES, J="tangent.ways"),
+        ForEachDirection(
+            of="coordinates",
+            steps=(Move(to="tangent.unit[nq * c]", source=D + "body.q", count="nq"),),
+        ),
+        call("tangent.lag", n="nq", sq="step.q", kappa="step.kappa", one="tangent.unit",
+             g_q="tangent.turns", A="tangent.rates", Q="tangent.lag", work="tangent.lag_work"),
+        ForEachDirection(
+            of="rates",
+            steps=(
+                call("tangent.lagged", n="nq", Q="tangent.lag", rate="tangent.ways[nq * c]",
+                     dq="tangent.along[nq * c]"),
+            ),
+        ),
+    ),
+)  # fmt: skip
+
+LAGGED = Pass(
+    "lagged", "body", "Change of the coordinates of a hinge by that of its speeds.",
+    (
+        RunPass(whole=HINGE_CHANGE),
+        Add(to=D + "body.qdot", source="body.rho"),
+        call("tangent.lagged", n="nq", Q="tangent.lag", rate=D + "body.qdot", dq="body.change"),
+    ),
+)  # fmt: skip
+
+
+# --- factored -----------------------------------------------------------------------------------
+
+#: Change of a law's efforts by its hinge alone: what expressions add to them reaches further.
+LAW_CHANGE = tuple(
+    DifferentiatedCall(
+        step.when, step.kernel + SLOPE, tuple({**dict(step.ports), "effort": "none"}.items()),
+        still=("effort",),
+    )
+    for step in LAWS.steps
+    if isinstance(step, Call)
+)  # fmt: skip
+
+LAW_SLOPES = Pass(
+    "law_slopes",
+    "law",
+    "Slopes of a law along the unknowns of its hinge.",
+    (
+        ForEachDirection(
+            of="felt", steps=(*LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))
+        ),
+    ),
+)
+
+TANGENT_OWN = Pass(
+    "tangent_own", "body", "A body's own load by its motion and its modes.",
+    (
+        Copy(to="tangent.laws", when="laws"),
+        RunPass(whole=LAG, when="curved"),
+        *position_dependent_loads.BEGUN,
+        call("body.load_by_motion", when="!modal", p="body.p", motion="body.motion",
+             J="tangent.S"),
+        *only(
+            "modal",
+            ForEachDirection(
+                of="motion",
+                steps=(
+                    RunPass(whole=differentiate_pass(MODAL_OWN)),
+                    position_dependent_loads.DRAGGED,
+                    Move(to="tangent.S[6 * c]", source=D + "body.e", count="6"),
+                    Move(to="bend.Z_z[n * c]", source=D + "modes.e_f", count="n"),
+                ),
+            ),
+            ForEachDirection(
+                of="modes",
+                steps=(
+                    RunPass(whole=differentiate_pass(MODAL_OWN)),
+                    position_dependent_loads.DRAGGED,
+                    Move(to="bend.K[6 * c]", source=D + "body.e", count="6"),
+                    Move(to="bend.Z_x[n * c]", source=D + "modes.e_f", count="n"),
+                ),
+            ),
+        ),
+        *position_dependent_loads.OWN_BY_PLACE,
+        *only("modal !section", Copy(to="bend.B"), Copy(to="bend.G"), Copy(to="bend.W"),
+              Copy(to="bend.still")),
+    ),
+    skip="idle",
+)  # fmt: skip
+
+
+_OWN = {name: f"bend.{name}" for name in ("K", "Z_z", "Z_x")}
+_NODE = {
+    **{name: f"bend.{name}" for name in ("B", "G", "W", "V", "D", "right", "gain", "work")},
+    **_OWN, "S": "tangent.S", "S_c": "local.S_c",
+}  # fmt: skip
+_ROWS = {"K": "local.K", "right": "local.right"}
+_TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
+
+#: What a body brings, linear in what its unknowns change: nothing here is eliminated.
+_COLUMNS = (
+    *only("modal section", *_section("bend")),
+    *only("moving", *_HINGE),
+    *only("outward", *_section("port")),
+)
+_ELIMINATED = (
+    *position_dependent_loads.MODES_OWN,
+    call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
+         **_NODE),
+    call("tangent.node", n="modes", when="modal !section", fails="tangent", H="bend.still",
+         **_NODE),
+    *only("modal", Copy(to="tangent.S", source="local.S_c")),
+    *position_dependent_loads.MODES_REDUCED,
+    *position_dependent_loads.HINGE_ROWS,
+    *only(
+        "moving",
+        call("generic{free}.tangent_rows", H="tangent.H", B="tangent.B", W="tangent.W",
+             S="tangent.S", **_ROWS, D="local.D", one="local.one"),
+        call("tangent.invert", n="free", fails="tangent", D="local.D", one="local.one",
+             inverse="tangent.inverse", work="local.work"),
+        call("generic{free}.tangent_reduce", inverse="tangent.inverse", **_ROWS,
+             G="tangent.G", gain="tangent.gain", V="tangent.V", S="tangent.S"),
+    ),
+    *position_dependent_loads.HINGE_REDUCED,
+    call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
+    position_dependent_loads.CARRIED,
+    call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
+         B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
+    position_dependent_loads.ABSORBED,
+)  # fmt: skip
+
+TANGENT_CONDENSE = Pass(
+    "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
+    (*_COLUMNS, *_ELIMINATED),
+    order=TIPS_TO_ROOT, skip="aside",
+)  # fmt: skip
+
+#: The same in two, where many tangents are made of one state: what bodies bring is made once.
+TANGENT_BROUGHT = Pass(
+    "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="aside"
+)
+TANGENT_ELIMINATED = replace(
+    TANGENT_CONDENSE, name="tangent_eliminated",
+    purpose="Unknowns of a body eliminated, of what it brings.", steps=_ELIMINATED,
+)  # fmt: skip
+
+_BROUGHT = (
+    Run(whole=TANGENT_OWN),
+    Run(whole=LAW_SLOPES),
+    Run(whole=position_dependent_loads.LOADS_BY_PLACE, when="posed"),
+    Run(whole=position_dependent_loads.FORCES_BY_PLACE, when="posed"),
+)
+TANGENT = Sweep(
+    "tangent",
+    "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
+    (*_BROUGHT, Run(whole=TANGENT_CONDENSE)),
+)
+BROUGHT = Sweep(
+    "tangent_brought",
+    "What the tangent is eliminated from, behind inverse dynamics.",
+    (*_BROUGHT, Run(whole=TANGENT_BROUGHT)),
+)
+
+
+# --- one right-hand side ------------------------------------------------------------------------
+
+_FELT_CHANGE = (
+    call("modal.modal_effort", H="section.H", e=D + "body.e", e_f=D + "modes.e_f",
+         tau=D + "modes.felt"),
+    Copy(to=D + "modes.e_f", source=D + "modes.felt"),
+)  # fmt: skip
+
+_NO_LOAD = Copy(to=D + "body.e")
+_RIGHT = Add(to=D + "modes.e_f", source="modes.column", times=-1)
+
+TANGENT_COLUMN = Pass(
+    "tangent_column", "body", "A right-hand side as loads of the rows.",
+    (
+        _NO_LOAD,
+        Copy(to=D + "body.tau"),
+        Add(to=D + "body.tau", source="body.column", times=-1),
+        *only("modal", Copy(to=D + "modes.e_f"), _RIGHT),
+    ),
+)  # fmt: skip
+
+
+def _pushed(subspace: str) -> tuple[Step, ...]:
+    return (
+        call("tangent.push", n="modes", H=subspace, V="bend.V", D="bend.D", e=D + "body.e",
+             e_f=D + "modes.e_f", rest="bend.rest", y="bend.y", e_c="local.e_c",
+             work="bend.work"),
+        Copy(to=D + "body.e", source="local.e_c"),
+    )  # fmt: skip
+
+
+_PUSH = {
+    "Rc": "body.R", "r": "body.r", "H": "tangent.H", "V": "tangent.V",
+    "inverse": "tangent.inverse", "e": D + "body.e", "e_f": "local.rows", "y": "tangent.y",
+    "e_I": D + "parent.e",
+}  # fmt: skip
+_STILL = call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
+              e_I=D + "parent.e")  # fmt: skip
+
+TANGENT_CARRIED = Pass(
+    "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
+    (
+        *only("modal section", *_pushed("section.H")),
+        *only("modal !section", *_pushed("bend.still")),
+        *only("outward", *_FELT_CHANGE),
+        *only(
+            "moving",
+            SelectColumns(to="local.rows", source=D + "body.tau"),
+            call("generic{free}.tangent_push", **_PUSH),
+        ),
+        _STILL,
+    ),
+    order=TIPS_TO_ROOT, skip="aside",
+)  # fmt: skip
+
+_MOVED = Copy(to=D + "body.motion", source="local.z")
+_BEHIND = _TH | {"z_I": D + "parent.motion", "z": D + "body.motion"}
+_ANSWER = _BEHIND | {"B": "tangent.B", "gain": "tangent.gain", "y": "tangent.y", "x": "local.x"}
+_SPREAD = ScatterSpeeds(to="body.answer", free="local.x")
+
+
+def _behind_modes(*known: Step) -> tuple[Step, ...]:
+    """Motion behind a body's own modes or those of the body that it is an end of."""
+    return (
+        call("frames.tangent_moved", when="!moving", **_BEHIND),
+        *known,
+        call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
+             z_c=D + "body.motion", z="local.z"),
+        *only("outward", _MOVED),
+        *position_dependent_loads.PORT_DISPLACED,
+        *position_dependent_loads.MODES_LEFT,
+        *only(
+            "modal",
+            call("tangent.answer", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
+                 z_c=D + "body.motion", x="modes.answer", z="local.z"),
+            _MOVED,
+        ),
+        *position_dependent_loads.MODES_DISPLACED,
+    )  # fmt: skip
+
+
+TANGENT_ANSWERED = Pass(
+    "tangent_answered", "body", "Unknowns that answer a right-hand side.",
+    (
+        Copy(to="body.answer"),
+        position_dependent_loads.MOVED,
+        *position_dependent_loads.HINGE_LEFT,
+        *only("moving", call("generic{free}.tangent_answer", **_ANSWER), _SPREAD),
+        *position_dependent_loads.HINGE_DISPLACED,
+        *_behind_modes(),
+    ),
+    skip="aside",
+)  # fmt: skip
+
+TANGENT_SOLUTION = Sweep(
+    "tangent_solution",
+    "One right-hand side through the factored tangent.",
+    (
+        Run(whole=TANGENT_COLUMN),
+        Run(hook="unit_load", when="united"),
+        Run(whole=TANGENT_CARRIED),
+        Run(whole=TANGENT_ANSWERED),
+    ),
+)
+
+
+# --- one right-hand side, and increments that are known -----------------------------------------
+
+KNOWN_COLUMN = Pass(
+    "known_column",
+    "body",
+    "A right-hand side, and own loads by what is known of modes.",
+    (
+        _NO_LOAD,
+        Copy(to=D + "body.tau", source="body.column"),
+        *only(
+            "modal",
+            Copy(to=D + "body.motion"),
+            Copy(to=D + "body.v"),
+            RunPass(whole=differentiate_pass(MODAL_OWN)),
+            position_dependent_loads.DRAGGED,
+            _RIGHT,
+        ),
+    ),
+)
+
+KNOWN_LAWS = Pass(
+    "known_laws", "law", "Change of a law's efforts by what is known of its hinge.",
+    (*LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
+)  # fmt: skip
+
+_KNOWN = call("frames.tangent_known", S="tangent.S", b="tangent.known", g="local.turned",
+              e_S="local.seen", e_b="local.known")  # fmt: skip
+_KNOWN_ROWS = (
+    *_along_modes("tangent.known", "local.turned", "place.known"),
+    Copy(to=D + "modes.e_f", source=D + "modes.felt"),
+)
+_KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
+
+#: Rows of a hinge are those of the load that is carried by its change along what is known, less
+#: the right-hand side and what laws make of it, which KNOWN_COLUMN and KNOWN_LAWS put together.
+KNOWN_CARRIED = Pass(
+    "known_carried", "body", "The same loads carried to the parent, with what is known.",
+    (
+        *only("section", _CARRIER, *_KNOWN_ROWS),
+        *only("modal section", *_pushed("section.H")),
+        *only("modal !section", *_pushed("bend.still")),
+        *only("section", _KNOWN, position_dependent_loads.KNOWN),
+        *only("outward", Add(to=D + "body.e", source="local.seen"), *_FELT_CHANGE,
+              Add(to=D + "body.e", source="local.turned")),
+        *only("modal section", _KNOWN_LOAD),
+        *only(
+            "moving",
+            _CARRIER,
+            *_along_hinge("tangent.known", "local.turned", "place.known", D + "body.tau"),
+            SelectColumns(to="local.rows", source="local.change"),
+            _KNOWN,
+            position_dependent_loads.KNOWN,
+            call("generic{free}.tangent_push_known", **_PUSH, e_b="local.known"),
+        ),
+        _STILL,
+    ),
+    order=TIPS_TO_ROOT, skip="aside",
+)  # fmt: skip
+
+KNOWN_ANSWERED = Pass(
+    "known_answered", "body", "Unknowns that answer a right-hand side, beside what is known.",
+    (
+        Copy(to="body.answer"),
+        position_dependent_loads.MOVED,
+        *only("moving placed", position_dependent_loads.KNOWN_MOVED),
+        *position_dependent_loads.HINGE_LEFT,
+        *only("moving", call("generic{free}.tangent_answer_known", **_ANSWER, b="tangent.known"),
+              _SPREAD),
+        *position_dependent_loads.HINGE_DISPLACED,
+        *_behind_modes(
+            Add(to=D + "body.motion", source="tangent.known", when="section"),
+            *only("section placed", position_dependent_loads.KNOWN_MOVED),
+        ),
+    ),
+    skip="aside",
+)  # fmt: skip
+
+TANGENT_BEYOND = Sweep(
+    "tangent_beyond",
+    "One right-hand side through the factored tangent, parts of the increments being known.",
+    (
+        Run(whole=KNOWN_COLUMN),
+        Run(whole=KNOWN_LAWS),
+        Run(whole=KNOWN_CARRIED),
+        Run(whole=KNOWN_ANSWERED),
+    ),
+)

@@ -1,0 +1,264 @@
+"""The schedule of the sweep for a reader: sweeps, passes, slots and traits."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Callable, Iterable, Iterator
+from itertools import groupby
+
+from mstmm.errors import ElementError
+
+from ..codegen.kernel_calls import MAX_SPEEDS, NAMED_CALLEES, POINTER_CALLEES, Specs
+from ..codegen.sweep_text import all_passes, sweep_files
+from ..schedule.differentiated_passes import ports_of
+from ..schedule.pass_steps import (
+    Add,
+    ByScrew,
+    Call,
+    CheckPivots,
+    ChooseBias,
+    Copy,
+    EachSpeed,
+    Evaluate,
+    ForEach,
+    ForEachDirection,
+    Gather,
+    Move,
+    Pass,
+    Run,
+    RunPass,
+    ScatterSpeeds,
+    SelectColumns,
+    Step,
+)
+from ..schedule.slot_definitions import CONSTANTS, SLOTS, TRAITS
+from ..schedule.sweeps import SWEEPS
+from .document import Code, Heading, Item, Paragraph
+from .formula_width import TextWidth
+from .plain_text import WIDTH
+from .show_page import FORMATS, render_page
+from .sweep_walkthrough import walkthrough_items
+
+#: What the page explains before it lists anything.
+_EXPLANATION = (
+    "A sweep runs passes one after the other; a pass meets every body (law, load, ...) in turn and "
+    "calls kernels over named slots: port=slot for what a kernel reads, and behind the arrow for "
+    "what it gives (+= where it adds).  Of a slot x the derivative along a direction is the slot "
+    "d:x.  Conditions and slots are explained in the end.  The loops "
+    "of the looped engine are printed from this list, the fused engine replays it.  The kernels "
+    "are elements: mstmm show sweep_frames, mstmm show pin."
+)
+
+
+def sweep_page(at: str, format: str, specs: Callable[[], Specs]) -> str:
+    """The page of the schedule (stage "equations") or of the C printed from it ("c").
+
+    `specs` gives the elements whose kernels are called.  Raises ElementError for another stage.
+    """
+    if at not in ("equations", "c"):
+        raise ElementError(
+            f"the sweep has no stage {at!r}; there are equations and c; its steps are elements of "
+            "their own: mstmm show sweep_generic2"
+        )
+    if at == "c":
+        text = "\n".join(sweep_files(specs()).values())
+        return FORMATS[format]("The sweep", [Heading("The sweep as C", 1), Code(text)])
+    steps = _StepWriter(specs())
+    return render_page("The sweep", lambda measure: list(_page_items(steps, measure)), format)
+
+
+def _page_items(steps: _StepWriter, measure: TextWidth) -> Iterator[Item]:
+    yield Heading("The sweep", 1)
+    yield from walkthrough_items(measure)
+    yield Heading("The schedule", 2)
+    yield Paragraph(_EXPLANATION)
+    for sweep in SWEEPS:
+        yield Heading(f"sweep {_spaced_name(sweep.name)}", 2)
+        yield Paragraph(sweep.purpose)
+        yield Code("\n".join(map(_run_line, sweep.runs)))
+    for sweep_pass in all_passes():
+        yield Heading(f"pass {_spaced_name(sweep_pass.name)}", 2)
+        yield Paragraph(sweep_pass.purpose)
+        yield Code("\n".join([_pass_heading(sweep_pass), *steps.lines(sweep_pass.steps, 1)]))
+    yield Heading("Conditions", 2)
+    yield Code(
+        "\n".join(_definition_rows(name, 12, description) for name, description in TRAITS.items())
+    )
+    yield Heading("Slots", 2)
+    yield Code(
+        "\n".join(
+            _definition_rows(name, 12, description) for name, description in CONSTANTS.items()
+        )
+    )
+    yield Code(
+        "\n".join(
+            _definition_rows(f"{slot.name:20} {slot.size.replace(' ', ' x ')}", 30, slot.meaning)
+            for slot in SLOTS.values()
+        )
+    )
+
+
+def _spaced_name(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _run_line(run: Run) -> str:
+    name = (
+        f"pass {_spaced_name(run.whole.name)}"
+        if run.whole
+        else f"by hand: {_spaced_name(run.hook)}"
+    )
+    return f"  {name:34}{_condition_prefix(run.when)}".rstrip()
+
+
+def _pass_heading(whole: Pass) -> str:
+    skip_text = f", passing by where {_condition_words(whole.skip)}" if whole.skip else ""
+    link_text = (
+        f", but not links where {_condition_words(whole.spares_links)}"
+        if whole.spares_links
+        else ""
+    )
+    return f"for every {whole.subject}, {whole.order}{skip_text}{link_text}"
+
+
+def _condition_words(when: str) -> str:
+    return " and ".join(
+        f"not {trait[1:]}" if trait.startswith("!") else trait for trait in when.split()
+    )
+
+
+def _condition_prefix(when: str) -> str:
+    return f"if {_condition_words(when)}" if when else ""
+
+
+class _StepWriter:
+    """Steps as lines."""
+
+    def __init__(self, specs: Specs) -> None:
+        self.specs = specs
+
+    def lines(self, steps: Iterable[Step], depth: int) -> list[str]:
+        """Steps under the same condition stand together behind it."""
+        lines = []
+        for traits, group in groupby(steps, key=lambda step: step.when):
+            lines += [f"{'  ' * depth}{_condition_prefix(traits)}:"] if traits else []
+            for step in group:
+                lines += self._step(step, depth + bool(traits))
+        return lines
+
+    def _step(self, step: Step, depth: int) -> list[str]:
+        indent = "  " * depth
+        if isinstance(step, ByScrew):
+            kinds = {
+                "a screw about x": step.about_x, "a screw about z": step.about_z,
+                "a rotation of which nothing is known": step.turning, "else": step.otherwise,
+            }  # fmt: skip
+            lines = [f"{indent}by what is known of {step.rotation} and {step.position}:"]
+            for case_name, steps in kinds.items():
+                lines += [f"{indent}  {case_name}:", *self.lines(steps, depth + 2)]
+            return lines
+        if isinstance(step, EachSpeed):
+            speed_text = "every imposed speed k" if step.imposed else "every speed k"
+            return [f"{indent}for {speed_text}:", *self.lines(step.steps, depth + 1)]
+        if isinstance(step, ForEachDirection):
+            return [
+                f"{indent}along {_DIRECTION_TEXTS[step.of]}:",
+                *self.lines(step.steps, depth + 1),
+            ]
+        if isinstance(step, ForEach):
+            return [f"{indent}for {_ROW_LOOPS[step.of]}:", *self.lines(step.steps, depth + 1)]
+        text = self._call(step) if isinstance(step, Call) else _STEP_TEXTS[type(step)](step)
+        return textwrap.wrap(
+            indent + text, WIDTH, subsequent_indent=indent + "    ", break_long_words=False,
+            break_on_hyphens=False,
+        )  # fmt: skip
+
+    def _call(self, step: Call) -> str:
+        element, _, name = step.kernel.partition(".")
+        key, name = self._like(element, name)
+        kernel = next(k for k in self.specs[key].kernels if k.name == name)
+        ports = ports_of(step)
+        read_ports = [f"{p.name}={ports[p.name]}" for p in kernel.inputs]
+        written_ports = [
+            f"{p.name}{'+=' if p.accumulate else '='}{ports[p.name]}"
+            for p in kernel.outputs
+            if p.name in ports
+        ]
+        fails = f"  (fails: {step.fails})" if step.fails else ""
+        return f"{step.kernel}({', '.join(read_ports)}) -> {', '.join(written_ports)}{fails}"
+
+    @staticmethod
+    def _like(element: str, name: str) -> tuple[tuple[str, str], str]:
+        """An element whose kernel has the ports of the one that is called, and its name."""
+        if element.startswith("generic{"):
+            return ("sweep", f"generic{MAX_SPEEDS}"), name
+        if element in POINTER_CALLEES:
+            key, names = POINTER_CALLEES[element]
+            return key, names.get(name, name)
+        return NAMED_CALLEES.get(element, ("sweep", element)), name
+
+
+#: Directions, each with its number c.
+_DIRECTION_TEXTS = {
+    "free": "every free speed c of the hinge, and what changes with it in a step",
+    "felt": "every free speed c of the hinge that the law feels",
+    "rates": "every speed c of the hinge alone",
+    "coordinates": "every coordinate c of the hinge alone",
+    "law": "every unknown c that goes with a speed of the law",
+    "modes": "every mode c, and what changes with it in a step",
+    "motion": "every entry c of the body's motion",
+    "spin": "every entry c of the body's angular velocity",
+    "place": "every entry c of a change of the body's place",
+    "turn": "every entry c of a turn of the body",
+}
+
+#: Rows met one by one.
+_ROW_LOOPS = {
+    "closings": "every row that closes on the body",
+    "own": "every coupling of its own speeds",
+    "openings": "every row that closes on the body, the other way round",
+    "pending": "every row that is open across the hinge",
+    "before": "every open row up to this one",
+    "bent": "every row that ends of the flexible body bring",
+    "bent_before": "every such row up to this one",
+    "rows": "every row of the hinge, in direction c",
+    "others": "every row that is coupled with it",
+    "seconds": "every such row up to this one",
+}
+
+
+def _do_text(step: RunPass) -> str:
+    assert step.whole is not None
+    return f"pass {_spaced_name(step.whole.name)}"
+
+
+def _add_text(step: Add) -> str:
+    times = "" if abs(step.times) == 1 else f"{abs(step.times)} "
+    return f"{step.to} {'-' if step.times < 0 else '+'}= {times}{step.source}"
+
+
+_STEP_TEXTS: dict[type, Callable[..., str]] = {
+    RunPass: _do_text,
+    Add: _add_text,
+    Copy: lambda s: f"{s.to} = {s.source or '0'}",
+    SelectColumns: lambda s: (
+        f"{s.to} = {'columns' if s.rows else 'rows and columns'} of {s.source} that belong to free "
+        "speeds"
+    ),
+    ScatterSpeeds: lambda s: f"{s.to} = {s.free} on free speeds, {s.imposed or '0'} on the others",
+    Move: lambda s: f"{s.to} = {s.source}",
+    Gather: lambda s: f"{s.to} = expression values at {s.places}",
+    Evaluate: lambda s: f"{s.to} = expression {s.expression}",
+    ChooseBias: lambda s: (
+        f"{s.motion} stopped along free unit columns of {s.subspace} by {s.chosen}"
+    ),
+    CheckPivots: lambda s: (
+        f"{s.pivots} must exceed the rounding of {s.own}, or of {s.whole}  (fails: {s.fails})"
+    ),
+}  # fmt: skip
+
+
+def _definition_rows(head: str, width: int, said: str) -> str:
+    lines = textwrap.wrap(said, WIDTH - width - 3)
+    continuation = [" " * (width + 3) + line for line in lines[1:]]
+    return "\n".join([f"  {head:{width}} {lines[0]}", *continuation])

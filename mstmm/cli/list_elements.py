@@ -1,0 +1,228 @@
+"""`mstmm list`: elements and methods available in scenes and in `mstmm show`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+
+import typer
+
+from mstmm.safe_text import escape_control_characters
+
+from .options import Json, quote
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from .stored_elements import Entry
+
+
+class Section(NamedTuple):
+    """Section of the list: title, column headings, rows, and the same as plain data."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    data: Any
+
+
+def _hinge_section() -> Section:
+    from mstmm.ir.hinge_properties import builtin_hinges
+
+    from .stored_elements import Entry, name_with_unit
+
+    entries = [
+        Entry(
+            "hinge", kind.name, kind.allows,
+            tuple(name_with_unit(c.name, c.unit) for c in kind.coordinates),
+            tuple(name_with_unit(c.name, c.unit) for c in kind.speeds), kind.keys,
+        )
+        for kind in builtin_hinges().values()
+    ]  # fmt: skip
+    rows = [(e.name, e.title, _join_names(e.coordinates), ", ".join(e.parameters)) for e in entries]
+    columns = ("hinge", "allowed motions", "coordinates q", "additional keys")
+    return Section("hinges", columns, rows, [_hinge_data(e) for e in entries])
+
+
+def _hinge_data(entry: Entry) -> dict[str, Any]:
+    data = entry.to_json()
+    data["keys"] = data.pop("parameters")
+    return data
+
+
+#: Parameters of the built-in body in a scene; its kernels use moments derived from these.
+_RIGID_BODY_PARAMETERS = ("mass [kg]", "center_of_mass [m]", "inertia [kg*m2]")
+
+
+def _element_section(kind: str, title: str) -> Section:
+    from .stored_elements import builtin_entries
+
+    entries = [
+        replace(e, parameters=_RIGID_BODY_PARAMETERS) if (kind, e.name) == ("body", "rigid") else e
+        for e in builtin_entries(kind)
+    ]
+    rows = [(e.name, e.title, _join_names(e.parameters)) for e in entries]
+    return Section(title, (kind, "description", "parameters"), rows, [e.to_json() for e in entries])
+
+
+def _flexible_section() -> Section:
+    from mstmm.scene.tables.beam import Beam
+    from mstmm.scene.tables.elastic import Elastic
+
+    return _key_section("flexible bodies", (("beam", Beam), ("elastic", Elastic)))
+
+
+def _law_section() -> Section:
+    from mstmm.scene.tables.law import Friction, Law, Limits, SpringLaw
+
+    owners = (
+        ("law", Law),
+        ("friction", Friction),
+        ("limits", Limits),
+        ("law of a spring", SpringLaw),
+    )
+    return _key_section("laws on coordinates", owners)
+
+
+def _key_section(title: str, owners: Sequence[tuple[str, type[BaseModel]]]) -> Section:
+    """Section of keys of tables of a scene, with their expected values."""
+    rows = [
+        (owner, key, str(entry.get("description") or "a table, see the scene format"))
+        for owner, model in owners
+        for key, entry in model.model_json_schema()["properties"].items()
+    ]
+    data = [dict(zip(("table", "key", "expected"), row, strict=True)) for row in rows]
+    return Section(title, ("table", "key", "expected"), rows, data)
+
+
+def _matrix_section() -> Section:
+    from .stored_elements import builtin_entries
+
+    rows = [
+        (f"classical_{entry.name}", entry.title, "; ".join(entry.sources))
+        for entry in builtin_entries("classical")
+    ]
+    data = [dict(zip(("name", "title", "sources"), row, strict=True)) for row in rows]
+    return Section("classical transfer matrices", ("matrix", "description", "source"), rows, data)
+
+
+def _sweep_section() -> Section:
+    from .stored_elements import builtin_entries
+
+    rows = [(f"sweep_{e.name}", e.title) for e in builtin_entries("sweep")]
+    data = [{"name": name, "title": title} for name, title in rows]
+    return Section("steps of the sweep", ("name", "description"), rows, data)
+
+
+def _method_section() -> Section:
+    from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get, names
+    from mstmm.runtime.run import classical_run
+    from mstmm.runtime.run.external_integrators import sundials
+
+    rows, data = [], []
+    for name in names():
+        method = get(name)
+        steps = "adaptive or fixed" if method.adaptive else "fixed"
+        rows.append((name, str(method.order), steps, method.source))
+        data.append({"name": name, "order": method.order, "steps": steps, "source": method.source})
+    choice = f"{AUTO_EXPLICIT}, and rodas4p2 or rodas5p where stability limits its steps"
+    rows.append((AUTO, "", "adaptive", choice))
+    data.append({"name": AUTO, "order": None, "steps": "adaptive", "source": choice})
+    scipy = "scipy-NAME"
+    description = "solve_ivp of SciPy on the same kernels: RK23, RK45, DOP853, Radau, BDF or LSODA"
+    rows.append((scipy, "", "adaptive", description))
+    data.append({"name": scipy, "order": None, "steps": "adaptive", "source": "scipy.integrate"})
+    for name in sundials.METHODS:
+        description = "CVODE of SUNDIALS on the same kernels (extra stiff)"
+        rows.append((name, "", "adaptive", description))
+        data.append({"name": name, "order": None, "steps": "adaptive", "source": description})
+    for name, product in classical_run.METHODS.items():
+        solution = "product of the matrices" if product else "Riccati on the matrices"
+        description = f"Rui, Wang, Zhang, ch. 7 and 8: absolute coordinates, {solution}"
+        rows.append((name, "2", "fixed", description))
+        data.append({"name": name, "order": 2, "steps": "fixed", "source": description})
+    columns = ("method", "order>", "steps", "source")
+    return Section("integration methods", columns, rows, data)
+
+
+def _user_section() -> Section:
+    from mstmm.runtime.kernels import kernel_store
+
+    from .stored_elements import entry_from_spec
+
+    entries = [entry_from_spec(spec) for spec in kernel_store.all_specs().values()]
+    rows = [
+        (e.kind, e.name, e.title, _join_names(e.coordinates), _join_names(e.parameters))
+        for e in entries
+    ]
+    columns = ("kind", "type", "description", "coordinates q", "parameters")
+    title = f"user elements, in {kernel_store.folder()}"
+    return Section(title, columns, rows, [e.to_json() for e in entries])
+
+
+def _installed_section() -> Section:
+    """Section of elements in installed packages, from entry points, without importing them."""
+    from importlib.metadata import entry_points
+
+    from mstmm.ir.element_spec import ENTRY_POINTS
+
+    entry_points_found = sorted(entry_points(group=ENTRY_POINTS), key=lambda e: e.name)
+    rows = [
+        (e.name, e.dist.name if e.dist is not None else "", e.value) for e in entry_points_found
+    ]
+    data = [dict(zip(("name", "package", "where"), row, strict=True)) for row in rows]
+    title = "elements of installed packages; to use them: mstmm generate --installed"
+    return Section(title, ("name", "package", "where"), rows, data)
+
+
+def _join_names(names: tuple[str, ...]) -> str:
+    return ", ".join(names) or "none"
+
+
+SECTIONS: dict[str, Callable[[], Section]] = {
+    "hinges": _hinge_section,
+    "bodies": lambda: _element_section("body", "bodies"),
+    "flexible": _flexible_section,
+    "forces": lambda: _element_section("force", "force elements, in [[spring]]"),
+    "laws": _law_section,
+    "matrices": _matrix_section,
+    "sweep": _sweep_section,
+    "methods": _method_section,
+    "user": _user_section,
+    "installed": _installed_section,
+}
+
+
+def _select_parts(parts: Sequence[str]) -> list[str]:
+    for part in parts:
+        if part not in SECTIONS:
+            raise typer.BadParameter(f"{quote(part)}: expected {', '.join(SECTIONS)}")
+    return list(dict.fromkeys(parts)) or list(SECTIONS)
+
+
+def list_elements(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(help=f"What to list ({', '.join(SECTIONS)}); default: everything."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List hinges, bodies, forces, laws, transfer matrices, methods and user elements."""
+    from . import terminal_output
+
+    sections = {part: SECTIONS[part]() for part in _select_parts(parts or [])}
+    if json:
+        terminal_output.print_json({part: section.data for part, section in sections.items()})
+        return
+    console = terminal_output.table_console()
+    for section in sections.values():
+        if section.rows:
+            console.print(terminal_output.build_table(section.title, section.columns, section.rows))
+        else:
+            console.print(f"{escape_control_characters(section.title)}: none")
+        console.print()
+    if not parts:
+        console.print(
+            "To show the equations of an element: mstmm show NAME, such as mstmm show pin"
+        )

@@ -1,0 +1,55 @@
+"""HTML for notebooks and reports: escaped text, tables, lists, and bundles of formats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from html import escape
+
+from .safe_text import escape_control_characters
+
+
+def text(words: object) -> str:
+    """Convert anything to printable text, escaped for HTML."""
+    return escape(escape_control_characters(str(words)))
+
+
+def table(rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
+    """HTML table of rows; without a head the first cell of each row is its header."""
+    head_cells = "".join(f"<th>{text(cell)}</th>" for cell in head)
+    lines = [f"<tr>{head_cells}</tr>"] if head else []
+    for row in rows:
+        cells = [f"<td>{text(cell)}</td>" for cell in row]
+        if not head:
+            cells[0] = f"<th>{text(row[0])}</th>"
+        lines.append(f"<tr>{''.join(cells)}</tr>")
+    return f'<div class="wide"><table class="rows">{"".join(lines)}</table></div>'
+
+
+def bullets(sentences: Iterable[object]) -> str:
+    """HTML list of sentences."""
+    return f"<ul>{''.join(f'<li>{text(sentence)}</li>' for sentence in sentences)}</ul>"
+
+
+def collapsible(summary: str, body: str) -> str:
+    """HTML section that is collapsed until the reader opens it."""
+    return f"<details><summary>{text(summary)}</summary>{body}</details>"
+
+
+class NotebookDisplay:
+    """Base class of objects that notebooks display, in all formats that the class provides."""
+
+    def _plain(self) -> str:
+        """Plain text, for displays without other formats."""
+        return repr(self)
+
+    def _repr_mimebundle_(
+        self, include: Collection[str] | None = None, exclude: Collection[str] | None = None
+    ) -> dict[str, str]:
+        """Representations by MIME type: those of `include` if given, without `exclude`."""
+        builders: dict[str, Callable[[], str] | None] = {
+            "text/plain": self._plain,
+            "text/html": getattr(self, "_repr_html_", None),
+            "text/latex": getattr(self, "_repr_latex_", None),
+        }
+        kinds = set(include or builders) - set(exclude or ())
+        return {kind: build() for kind, build in builders.items() if build and kind in kinds}

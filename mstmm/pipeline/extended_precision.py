@@ -1,0 +1,66 @@
+"""Accelerations of a small scene in extended precision, to measure rounding of doubles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import mpmath
+
+from ..array_validation import Array
+from ..derive.fuse.scene_kernels import fuse
+from ..derive.verification.kernel_evaluation import evaluate
+from ..ir import KernelIR
+from ..ir.element_spec import ElementSpec
+from ..ir.scene_structure import Key, Structure
+from ..runtime.engine.compiled_scene import CompiledScene
+from ..runtime.kernels import kernel_store
+from ..runtime.packing.fused_structure import structure_of
+from .fused_code import kernel_lookup
+
+#: Digits of the evaluation; a Riccati sweep loses as many digits as the mass ratio has.
+DIGITS = 60
+
+
+def extended_precision_accelerations(
+    model: CompiledScene, t: float = 0.0
+) -> Callable[[Array, Array], list[Any]]:
+    """Function (q (nq,), u (nu,)) -> udot (nu,) with DIGITS digits, at the time t (s).
+
+    It interprets the Riccati sweep as one kernel.  The numbers of the scene are the doubles that
+    the engines use.
+    """
+    elements, definitions = kernel_store.load_known(kernel_store.required_types(model.scene))
+    structure, numbers = structure_of(model.packed.system, elements, False)
+    kernel = _fused_kernel(structure, definitions)
+    constant_inputs = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * structure.nu}
+    fixed_inputs = {"p": _floats(numbers), "t": [t], **constant_inputs}
+
+    def accelerations(q: Array, u: Array) -> list[Any]:
+        outputs = evaluate(kernel, fixed_inputs | {"q": _floats(q), "u": _floats(u)}, DIGITS)
+        return list(outputs["udot"])
+
+    return accelerations
+
+
+#: Kernel of the last structure: subsequent calls mostly have other numbers of the same scene.
+_last_kernel: dict[str, KernelIR] = {}
+
+
+def _fused_kernel(structure: Structure, definitions: Mapping[Key, ElementSpec]) -> KernelIR:
+    key = structure.identity()
+    if key not in _last_kernel:
+        _last_kernel.clear()
+        _last_kernel[key] = fuse(structure, kernel_lookup(definitions)).kernels["accelerations"]
+    return _last_kernel[key]
+
+
+def relative_error(found: Array, exact: Sequence[Any]) -> float:
+    """Largest difference divided by the largest entry of `exact`, which must not be zero."""
+    with mpmath.workdps(DIGITS):
+        differences = [abs(mpmath.mpf(float(a)) - b) for a, b in zip(found, exact, strict=True)]
+        return float(max(differences) / max(map(abs, exact)))
+
+
+def _floats(numbers: Array) -> list[float]:
+    return [float(x) for x in numbers]

@@ -1,0 +1,263 @@
+"""Linear model as SymPy expressions: its schedule evaluated on formulas, not on numbers.
+
+Parameters that stay symbols pass through packing as formulas.  The residual of the scene is inlined
+and differentiated as for fused code, and its kernel evaluated on formulas.  There is no second
+derivation.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..derive.fuse.linearisation import fuse_linear, fuse_required
+from ..errors import SceneError
+from ..ir import KernelIR, Port
+from ..ir.graph import Graph
+from ..ir.interpreter import replay_kernel
+from ..ir.scene_structure import Key
+from ..ir.symbolic_arithmetic import FormulaArithmetic
+from ..numerics.piecewise_polynomial import NUMBERS_PER_PIECE
+from ..numerics.symbolic_number import Formula, SymbolTable, factor_of_symbol, formula
+from ..runtime.linear.frozen_loads import INERTIAL
+from ..runtime.linear.input_channels import Channel
+from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
+from ..runtime.packing.expression_tapes import MOVING, state_ports
+from ..runtime.packing.fused_structure import structure_and_numbers
+from ..runtime.packing.parameter_derivatives import refuse_folded, seed_derivatives
+from ..runtime.packing.system import LoadNumbers, System
+from .symbolic_names import SymbolNames, resolve_kept_names
+from .sympy_expressions import SympyWriter
+
+if TYPE_CHECKING:
+    from ..runtime.linear.linear_equations import LinearEquations
+
+Kernels = Callable[[Key, str], KernelIR]
+Rows = list[list[Formula]]
+
+#: Largest number of coordinates, and of products of terms (some seconds); each term converted to an
+#: expression counts as the third number of products.
+MAX_COORDINATES, MAX_PRODUCTS, _PRODUCTS_PER_TERM = 24, 300_000, 10
+#: Largest deviation of an equilibrium from a quarter turn, or from a 1 of a quaternion.
+_MAX_ROUNDING = 1e-13
+#: Largest acceleration that counts as zero, relative to those of stiffness and damping in motions
+#: of order one.
+_MAX_ZERO_ACCELERATION = 1e-12
+
+
+def symbolic_linear_model(
+    linear: LinearEquations, keep: Sequence[str], kernels: Kernels
+) -> SymbolicLinearModel:
+    """Derive the linear model in SymPy; see `LinearEquations.symbolic`."""
+    _require_symbolic(linear)
+    names = resolve_kept_names(linear, keep)
+    reason = "formula; linearize models of other values"
+    refuse_folded(linear.model.scene, list(names.parameters), reason)
+    equations = _FormulaEquations(linear, names, kernels)
+    writer = SympyWriter()
+    symbols = {name: writer.symbol(equations.symbols[name]) for name in keep}
+    m, c, k = map(writer.matrix, equations.counted(equations.second_order()))
+    input_matrices = [equations.pushed(channels) for channels in (linear.controls, linear.others)]
+    v, w = map(writer.matrix, equations.counted(input_matrices))
+    numbers = {
+        symbols[name]: kept_formula.value for name, kept_formula in equations.symbols.items()
+    }
+    return SymbolicLinearModel(
+        m, c, k, v, w, symbols, numbers, linear.coordinates, linear.inputs, linear.disturbances
+    )
+
+
+def _require_symbolic(linear: LinearEquations) -> None:
+    if linear.drives:
+        raise SceneError(
+            f"symbolic: the motion of the drive of {linear.driven[0]} is an input, for which there "
+            "is no symbolic column; remove it from the inputs"
+        )
+    if len(linear) > MAX_COORDINATES:
+        raise SceneError(
+            f"symbolic: the scene has {len(linear)} coordinates; the limit is {MAX_COORDINATES}; "
+            "use M, C and K of linearize, after with_parameters for other values"
+        )
+    if linear.model.packed.releases:
+        names = ", ".join(f'"{name}"' for name in linear.model.packed.releases)
+        raise SceneError(
+            f"symbolic: hinge {names} is released during the run, which changes the form of the "
+            "equations; remove the release"
+        )
+
+
+class _FormulaEquations:
+    """Linear model on formulas; `symbols` has the symbols of the names that are kept."""
+
+    def __init__(self, linear: LinearEquations, names: SymbolNames, kernels: Kernels) -> None:
+        self._linear, self._kernels, self._book = linear, kernels, SymbolTable(MAX_PRODUCTS)
+        self.symbols: dict[str, Formula] = {}
+        model, state = linear.model, linear.state
+        self._known = model.known or {}
+        #: Contribution of a unit of each disturbance input to R, filled in by `second_order`.
+        self._inputs: dict[int, list[Formula]] = {
+            channel.input: []
+            for channel in (*linear.controls, *linear.others)
+            if channel.input >= 0
+        }
+        values = model.parameters
+        seeds = [self._symbol(name, values[full]) for full, name in names.parameters.items()]
+        self._system, self._frames = seed_derivatives(
+            model.scene, self._known, list(names.parameters), lambda _, k: seeds[k]
+        )
+        if dry := linear.dry:
+            self._system = replace(self._system, laws=dry.replaced(self._system.laws))
+        self._q = [_rounded_formula(x) for x in state.q.tolist()]
+        self._u = [formula(x) for x in state.u.tolist()]
+        for entries, kept_names in ((self._q, names.coordinates), (self._u, names.speeds)):
+            for index, name in kept_names.items():
+                entries[index] = self._symbol(name, entries[index].value)
+
+    def _symbol(self, name: str, value: float) -> Formula:
+        self.symbols[name] = symbol = self._book.symbol(name, value)
+        return symbol
+
+    def counted(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
+        """Count the terms of matrices that will be converted, and return the matrices."""
+        terms = sum(len(x.terms) for rows in matrices for row in rows for x in row)
+        self._book.count(_PRODUCTS_PER_TERM * terms)
+        return matrices
+
+    def second_order(self) -> tuple[Rows, Rows, Rows]:
+        """Matrices M, C and K."""
+        linear = self._linear
+        structure, p = structure_and_numbers(self._system, self._known)
+        input_values = self._system.inputs_at(linear.state.t).tolist()
+        indices = dict(structure.inputs)
+        for entry, index in indices.items():
+            p[index] = input_values[entry]
+        used_inputs = {
+            i: indices[NUMBERS_PER_PIECE * i + 1]
+            for i in self._inputs
+            if NUMBERS_PER_PIECE * i + 1 in indices
+        }
+        kernel = fuse_linear(structure, self._kernels, linear.free, list(used_inputs.values()))
+        outputs = self._run(kernel, p, self._u, self._accelerations())
+        self._inputs |= {
+            entry: outputs["P"][k :: len(used_inputs)] for k, entry in enumerate(used_inputs)
+        }
+        m, c, k = (_rows(outputs[name], len(linear)) for name in "MCK")
+        if linear.turning is None:
+            return m, c, k
+        if not all(x.fixed for x in outputs["N"]):
+            raise SceneError(
+                "symbolic: kept numbers affect the relation of coordinates and speeds of a hinge; "
+                "linearize at rest, or leave them numbers"
+            )
+        g = [[formula(x) for x in row] for row in linear.turning.tolist()]
+        return m, _subtract_product(c, m, g), _subtract_product(k, c, g)
+
+    def _entry(self, push: Channel, symbol: Formula, required: list[Formula], row: int) -> Formula:
+        """Effort on a free speed per unit of a disturbance or input."""
+        speed = self._linear.free[row]
+        if push.input >= 0:
+            column = self._inputs[push.input]
+            return -column[row] if column else formula(0.0)
+        if push.speed >= 0:
+            return formula(float(push.speed == speed))
+        effort = factor_of_symbol(required[speed], symbol)
+        return -effort if push.end else effort
+
+    def _accelerations(self) -> list[Formula]:
+        linear = self._linear
+        scale = np.abs(np.linalg.solve(linear.M, np.hstack([linear.K, linear.C]))).max(initial=0)
+        is_zero = np.abs(linear.state.a) <= _MAX_ZERO_ACCELERATION * scale
+        return [formula(x) for x in np.where(is_zero, 0.0, linear.state.a).tolist()]
+
+    def pushed(self, pushes: Sequence[Channel]) -> Rows:
+        """Input matrix V or W, from the efforts of the tree at rest under a symbol per input.
+
+        The efforts are proportional to the symbols.
+        """
+        n = len(self._linear.free)
+        if not pushes:
+            return [[] for _ in range(n)]
+        symbols = [self._book.symbol(channel.name, 1.0) for channel in pushes]
+        structure, p = structure_and_numbers(self._under(pushes, symbols), self._known)
+        zeros = [formula(0.0)] * len(self._u)
+        kernel = fuse_required(structure, self._kernels)
+        required = self._run(kernel, p, zeros, zeros)["required"]
+        return [
+            [
+                self._entry(channel, symbol, required, row)
+                for channel, symbol in zip(pushes, symbols, strict=True)
+            ]
+            for row in range(n)
+        ]
+
+    def _under(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
+        """Tree whose only gravity and loads are the symbols of `pushes`."""
+        gravity: list[Any] = [0.0, 0.0, 0.0]
+        loads = []
+        for index, (channel, symbol) in enumerate(zip(pushes, symbols, strict=True)):
+            if channel.end:
+                loads.append(self._load(channel, index))
+            elif channel.speed < 0 and channel.input < 0:
+                gravity[channel.axis] = gravity[channel.axis] + symbol
+        return replace(
+            self._system, gravity=tuple(gravity), laws=(), forces=(), loads=tuple(loads),
+            values=self._values(len(pushes)) if loads else None, drives=None, driven=(),
+            moving=dict(enumerate(symbols)),
+        )  # fmt: skip
+
+    def _load(self, push: Channel, place: int) -> LoadNumbers:
+        body, _, offset = self._frames.end(push.end)
+        components = tuple(place if axis == push.axis else -1 for axis in range(3))
+        no_components = (-1, -1, -1)
+        force, moment = (
+            (components, no_components) if push.kind == "force" else (no_components, components)
+        )
+        return LoadNumbers(body, -1, INERTIAL, offset, force, moment)
+
+    def _values(self, count: int) -> KernelIR:
+        """Kernel that returns the symbols as values of expressions."""
+        graph = Graph()
+        ports = [*state_ports(self._frames.layout), Port(MOVING, (count,))]
+        values: dict[str, object] = {"values": graph.vector(MOVING, count)}
+        return graph.kernel("values", ports, [Port("values", (count,))], values)
+
+    def _run(
+        self, kernel: KernelIR, p: list[Any], u: list[Formula], a: list[Formula]
+    ) -> dict[str, list[Formula]]:
+        arguments = {"p": p, "t": [self._linear.state.t], "q": self._q, "u": u, "a": a}
+        return evaluate_symbolically(kernel, arguments, FormulaArithmetic())
+
+
+def evaluate_symbolically(
+    kernel: KernelIR, given: dict[str, list[Any]], arithmetic: FormulaArithmetic
+) -> dict[str, list[Formula]]:
+    """Evaluate a kernel of a scene on formulas, with zero memory of its laws."""
+    memory = next(port for port in kernel.inputs if port.name == "memory").length()
+    return replay_kernel(kernel, given | {"memory": [0.0] * memory}, arithmetic, None)
+
+
+def _rounded_formula(x: float) -> Formula:
+    """Formula of a coordinate, replaced by a quarter turn or 1 if it differs by rounding."""
+    for exact in (round(x / (math.pi / 2)) * (math.pi / 2), math.copysign(1.0, x)):
+        if abs(x - exact) <= _MAX_ROUNDING:
+            return formula(exact)
+    return formula(x)
+
+
+def _rows(entries: list[Formula], n: int) -> Rows:
+    return [entries[n * i : n * i + n] for i in range(n)]
+
+
+def _subtract_product(a: Rows, b: Rows, c: Rows) -> Rows:
+    """Difference a - b c of matrices."""
+    return [
+        [
+            sum((-x * row[j] for x, row in zip(b_row, c, strict=True)), entry)
+            for j, entry in enumerate(a_row)
+        ]
+        for a_row, b_row in zip(a, b, strict=True)
+    ]

@@ -1,0 +1,293 @@
+"""Consistency checks across the elements of a scene: references, names, types, physics."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import chain as one_after_another
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from ...expression.expression import Expression
+from ...expression.parser import context_of_name
+from ...risk import Risk
+from ..tables.closures import CURVE
+from ..validators.inertia import negative_moment_message, triangle_message
+from ..validators.scalars_and_vectors import GROUND, Location, split_reference
+from ..validators.validation_messages import MAX_PROBLEMS, TABLES, Problem, did_you_mean
+from . import constraints, couplings, external_names, flexible_bodies, idle_loads, inputs, topology
+from .degree_warnings import degree_warnings
+from .expression_names import Scope, modal_names, name_problem
+
+if TYPE_CHECKING:
+    from ..tables.body import BodyTable
+    from ..tables.scene_tables import SceneTables
+
+
+def problems(scene: SceneTables) -> list[Problem]:
+    """Problems of consistency between the elements of a scene."""
+    if not (scene.body or scene.chain or scene.beam or scene.elastic):
+        return [(("body",), "a scene needs at least one body; add a [[body]]")]
+    first_findings = _first_problems(
+        _duplicate_problems(scene),
+        _reference_problems(scene),
+        _inertia_problems(scene),
+        inputs.problems(scene),
+        flexible_bodies.problems(scene),
+        external_names.problems(scene),
+    )
+    return first_findings or _first_problems(
+        _expression_problems(scene), inputs.drive_problems(scene), constraints.problems(scene),
+        couplings.problems(scene), _tree_problems(scene), flexible_bodies.spin_problems(scene),
+    )  # fmt: skip
+
+
+def _tree_problems(scene: SceneTables) -> Iterator[Problem]:
+    """Problems of the spanning tree, each at the table that the body comes from."""
+    first_indices = (("body", 0), ("beam", len(scene.body)),
+              ("elastic", len(scene.body) + len(scene.beam)))  # fmt: skip
+    for (table, index, *inner_location), message in topology.problems(scene.skeleton):
+        if table == "body" and isinstance(index, int):
+            table, first_index = next(
+                table_start for table_start in reversed(first_indices) if index >= table_start[1]
+            )
+            index -= first_index
+        yield (table, index, *inner_location), message
+
+
+def _first_problems(*findings: Iterable[Problem]) -> list[Problem]:
+    return list(islice(one_after_another(*findings), MAX_PROBLEMS))
+
+
+def _duplicate_problems(scene: SceneTables) -> Iterator[Problem]:
+    for table in TABLES:
+        first_indices: dict[str, int] = {}
+        for i, element in enumerate(getattr(scene, table)):
+            first_index = first_indices.setdefault(element.name, i)
+            if first_index != i:
+                yield (
+                    (table, i, "name"),
+                    f'"{element.name}" is also the name of {table} number {first_index + 1}; '
+                    f"rename one",
+                )
+    labels_by_name: dict[str, str] = {}
+    for table in ("body", "hinge", "beam", "elastic", "chain", "bushing", "constraint", "coupling"):
+        label = _TABLE_LABELS.get(table, f"a {table}")
+        for i, element in enumerate(getattr(scene, table)):
+            first_label = labels_by_name.setdefault(element.name, label)
+            if first_label != label and {table, first_label} not in _SHARED_NAME_TABLES:
+                yield (
+                    (table, i, "name"),
+                    f'"{element.name}" is also the name of {first_label}; rename one',
+                )
+
+
+#: Name of an element of a table in messages.
+_TABLE_LABELS = {"elastic": "an elastic body"}
+#: A body and a hinge may have the same name: references to them are never ambiguous.
+_SHARED_NAME_TABLES = ({"hinge", "a body"},)
+
+
+def _reference_problems(scene: SceneTables) -> Iterator[Problem]:
+    bodies = scene.skeleton.bodies
+    for i, hinge in enumerate(scene.hinge):
+        yield from _end_problems(hinge.inboard, scene, ("hinge", i, "inboard"))
+        yield from _end_problems(hinge.outboard, scene, ("hinge", i, "outboard"))
+        if bodies.place(hinge.outboard_body) is not None:
+            yield (
+                ("hinge", i, "outboard"),
+                f'"{hinge.outboard_body}" already has an inboard hinge in its chain; '
+                "use it as inboard body of this hinge",
+            )
+    for i, chain in enumerate(scene.chain):
+        yield from _end_problems(chain.inboard, scene, ("chain", i, "inboard"))
+    for i, load in enumerate(scene.load):
+        yield from _end_problems(load.on, scene, ("load", i, "on"))
+        if load.at is not None:
+            yield from _mass_center_problems(split_reference(load.on)[0], scene, ("load", i, "at"))
+        yield from _axes_problems(scene, i)
+    for i, shape in enumerate(scene.shape):
+        yield from _end_problems(shape.on, scene, ("shape", i, "on"))
+    for table in ("spring", "bushing", "constraint"):
+        for i, element in enumerate(getattr(scene, table)):
+            yield from _end_problems(element.from_, scene, (table, i, "from"))
+            yield from _end_problems(element.to, scene, (table, i, "to"))
+    hinges = {hinge.name: hinge for hinge in scene.hinge}
+    for i, event in enumerate(scene.event):
+        if event.hinge is None:
+            continue
+        location: Location = ("event", i, "hinge")
+        if event.hinge not in hinges:
+            yield location, f'there is no hinge "{event.hinge}"{did_you_mean(event.hinge, hinges)}'
+        elif not hinges[event.hinge].is_weld and hinges[event.hinge].drive is None:
+            yield location, f'"{event.hinge}" cannot be released: it is neither driven nor fixed'
+
+
+def _end_problems(reference: str, scene: SceneTables, place: Location) -> Iterator[Problem]:
+    """Problems of a reference: no such body, or no such end."""
+    body, end = split_reference(reference)
+    if body == GROUND:
+        return
+    bodies = scene.skeleton.bodies
+    ends = bodies.ends(body)
+    if ends is None:
+        yield place, bodies.missing(body)
+    elif end and end not in ends:
+        remedy = did_you_mean(end, ends) if ends else f"; give it ends = {{ {end} = [x, y, z] }}"
+        yield place, f'body "{body}" has no end "{end}"{remedy}'
+    elif not end and body in {elastic.name for elastic in scene.elastic}:
+        remedy = f'write "{body}.{next(iter(ends))}"' if ends else "give it ends"
+        yield place, f'"{body}" is an elastic body, which connects only at its ends; {remedy}'
+
+
+def _mass_center_problems(body: str, scene: SceneTables, place: Location) -> Iterator[Problem]:
+    """Problems of a load at the mass centre of a body that is not rigid."""
+    flexible_names = {flexible_body.name for flexible_body in (*scene.beam, *scene.elastic)}
+    bodies = scene.skeleton.bodies
+    number = bodies.find(body)
+    if body in flexible_names or (number is not None and bodies[number].type != "rigid"):
+        yield place, f'"{body}" is not rigid and has no fixed mass centre; give an end'
+
+
+def _axes_problems(scene: SceneTables, i: int) -> Iterator[Problem]:
+    load = scene.load[i]
+    bodies = scene.skeleton.bodies
+    is_body = bodies.find(load.axes) is not None
+    if load.axes in ("inertial", "body"):
+        if is_body and not (load.axes == "body" == split_reference(load.on)[0]):
+            yield (
+                ("load", i, "axes"),
+                f'"{load.axes}" is ambiguous: a body has this name; rename the body',
+            )
+    elif not is_body:
+        options = ["inertial", "body", *(body.name for body in scene.skeleton.body)]
+        yield (
+            ("load", i, "axes"),
+            f'there is no body "{load.axes}"{did_you_mean(load.axes, options)}',
+        )
+
+
+def _body_tables(scene: SceneTables) -> Iterator[tuple[Location, str, BodyTable]]:
+    """Yield (location, name for messages, table) of every body table, chain patterns included."""
+    for i, body in enumerate(scene.body):
+        yield ("body", i), f'body "{body.name}"', body
+    for i, chain in enumerate(scene.chain):
+        for k, table in enumerate(chain.body):
+            yield ("chain", i, "body", k), f'body {k + 1} of chain "{chain.name}"', table
+
+
+def _inertia_problems(scene: SceneTables) -> Iterator[Problem]:
+    for location, _, body in _body_tables(scene):
+        if scene.allow_unphysical_inertia or body.allow_unphysical_inertia:
+            continue
+        negative_text = negative_moment_message(body.inertia_matrix)
+        triangle_text = triangle_message(body.inertia_matrix)
+        if negative_text is not None:
+            yield (*location, "inertia"), f"{negative_text}, or accept it with {_ACCEPT_KEY}"
+        elif triangle_text is not None:
+            yield (
+                (*location, "inertia"),
+                f"{triangle_text}, so no body has this inertia; correct it, or accept it with "
+                f"{_ACCEPT_KEY}",
+            )
+
+
+_ACCEPT_KEY = "allow_unphysical_inertia = true"
+
+
+def risks(scene: SceneTables) -> tuple[Risk, ...]:
+    """Warnings about accepted but doubtful input.
+
+    They concern impossible inertias, angles that look like degrees, beams outside their theory,
+    unused inputs, and loads without effect.
+    """
+    warnings, rounded_moments = [], []
+    for _, name, body in _body_tables(scene):
+        message = triangle_message(body.inertia_matrix)
+        if message is not None:
+            means = f"{name}: inertia: {message}; accepted because of allow_unphysical_inertia"
+            remedy = "correct it unless it does not describe a real body"
+            warnings.append(Risk("inertia", name, means, remedy, doubt=False, before=True))
+        rounded_moments += [(name, x) for k, x in enumerate(body.inertia[:3])
+                  if x < 0 and body.inertia_matrix[k][k] == 0]  # fmt: skip
+    if rounded_moments:
+        name, entry = rounded_moments[0]
+        more_text = f" (and {len(rounded_moments) - 1} more)" if len(rounded_moments) > 1 else ""
+        means = f"{name}: inertia: {entry:.3g} kg m^2 is rounding and is treated as zero{more_text}"
+        warnings.append(Risk(
+            "inertia", name, means, "write 0", entry, 0.0, "kg*m2", doubt=False, before=True,
+        ))  # fmt: skip
+    return (
+        *warnings,
+        *_proportion_warnings(scene),
+        *degree_warnings(scene),
+        *flexible_bodies.flexible_warnings(scene),
+        *inputs.unused_input_warnings(scene),
+        *idle_loads.idle_load_warnings(scene),
+    )
+
+
+#: Extent in m above which a rigid body below this mass per extent in kg/m suggests wrong units.
+_MIN_LONG_EXTENT, _MAX_LIGHT_MASS_PER_LENGTH = 20.0, 2e-3
+
+
+def _proportion_warnings(scene: SceneTables) -> Iterator[Risk]:
+    """Warnings about rigid bodies so long and light that their lengths are probably in mm."""
+    for _, name, body in _body_tables(scene):
+        points = [body.center_of_mass, *(end.position for end in body.ends.values())]
+        extent = max(math.dist((0.0, 0.0, 0.0), location) for location in points)
+        if (
+            body.type == "rigid"
+            and extent >= _MIN_LONG_EXTENT
+            and 0 < body.mass <= _MAX_LIGHT_MASS_PER_LENGTH * extent
+        ):
+            yield Risk(
+                "proportions", name,
+                f"{name}: it extends over {extent:g} m with a mass of {body.mass:g} kg",
+                "lengths are in m and masses in kg; convert other units",
+                body.mass / extent, _MAX_LIGHT_MASS_PER_LENGTH, "kg/m", doubt=False, before=True,
+            )  # fmt: skip
+
+
+# --- names in expressions -------------------------------------------------------------------------
+
+
+def _expression_problems(scene: SceneTables) -> Iterator[Problem]:
+    hinges, bodies = scene.hinges, scene.skeleton.bodies
+    curves = {constraint.name for constraint in scene.constraint if constraint.type == CURVE}
+    general_scope = Scope(
+        hinges, bodies, flexible=modal_names(scene), inputs=scene.channels, curves=curves
+    )
+    event_scope = replace(general_scope, positions=True)
+    for i, hinge in enumerate(scene.hinge):
+        hinge_scope = replace(general_scope, own=hinge)
+        for k, effort in enumerate(hinge.law.effort):
+            yield from _name_problems(effort, hinge_scope, ("hinge", i, "law", "effort", k))
+        if hinge.release is not None:
+            release_scope = replace(event_scope, own=hinge)
+            yield from _name_problems(hinge.release, release_scope, ("hinge", i, "release"))
+    for i, chain in enumerate(scene.chain):
+        for j, table in enumerate(chain.hinge):
+            member_scope = replace(general_scope, own=hinges[hinges.starts[i] + j])
+            for k, effort in enumerate(table.law.effort):
+                yield from _name_problems(
+                    effort, member_scope, ("chain", i, "hinge", j, "law", "effort", k)
+                )
+    for i, load in enumerate(scene.load):
+        for key in ("force", "moment", "force_per_length"):
+            for k, entry in enumerate(getattr(load, key) or ()):
+                yield from _name_problems(entry, general_scope, ("load", i, key, k))
+    for i, event in enumerate(scene.event):
+        yield from _name_problems(event.when, event_scope, ("event", i, "when"))
+    for i, spring in enumerate(scene.spring):
+        yield from _name_problems(
+            spring.law.effort, replace(general_scope, spring=True), ("spring", i, "law", "effort")
+        )
+
+
+def _name_problems(expression: Expression, scope: Scope, place: Location) -> Iterator[Problem]:
+    for name in expression.names:
+        message = name_problem(name, scope)
+        if message is not None:
+            yield place, message + context_of_name(expression.text, name)

@@ -1,0 +1,79 @@
+"""Mapping from names of a robot file to names of a scene."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Container, Iterable, Mapping
+
+from ..tables.external.external_names import is_external_name
+from ..validators.scalars_and_vectors import GROUND
+
+_INVALID_CHARACTERS, _VALID_NAME = re.compile("[^A-Za-z0-9_]+"), re.compile("[A-Za-z][A-Za-z0-9_]*")
+_MAX_NAME_LENGTH = 60
+
+
+class NameRegistry:
+    """Registry that gives each name of a file a unique valid name in the scene."""
+
+    def __init__(self) -> None:
+        self._taken = {GROUND}
+
+    def take_all(
+        self, names: Iterable[str], instead: str, others: Iterable[str] = ()
+    ) -> dict[str, str]:
+        """Register several names: scene names by file names.
+
+        Names that are valid in a scene are kept; no other name becomes one of `others`.
+        """
+        file_names, scene_names = list(names), dict[str, str]()
+        for keep_valid in (True, False):
+            selected_names = [name for name in file_names if _is_valid_name(name) == keep_valid]
+            scene_names |= {name: self.take(name, instead) for name in selected_names}
+            self._taken.update(others)
+        return {name: scene_names[name] for name in file_names}
+
+    def take(self, name: str, instead: str) -> str:
+        """Register a name: invalid characters become _, and the result is made unique.
+
+        `instead` is the prefix of names that do not begin with a letter.
+        """
+        base_name = _INVALID_CHARACTERS.sub("_", name).strip("_")[:_MAX_NAME_LENGTH]
+        if not base_name[:1].isalpha():
+            base_name = f"{instead}_{base_name}".rstrip("_")
+        unique_name, count = base_name, 1
+        while unique_name in self._taken:
+            count += 1
+            unique_name = f"{base_name}_{count}"
+        self._taken.add(unique_name)
+        return unique_name
+
+
+def _is_valid_name(name: str) -> bool:
+    return bool(_VALID_NAME.fullmatch(name)) and name != GROUND
+
+
+def reference_names(
+    links: Mapping[str, str], joints: Mapping[str, str], references: Container[str]
+) -> dict[str, dict[str, str]]:
+    """Table [names] of a scene: names of links and joints that are renamed in the scene.
+
+    Where several links are one body, the first of them is the name of the body.  `references` are
+    the bodies and ends of the scene.
+    """
+    shared_references = {
+        scene_name for scene_name, count in Counter(links.values()).items() if count > 1
+    }
+    bodies = {
+        name: scene_name
+        for name, scene_name in links.items()
+        if is_external_name(name)
+        and (scene_name in shared_references if name == scene_name else name not in references)
+    }
+    hinges = {
+        name: scene_name
+        for name, scene_name in joints.items()
+        if is_external_name(name) and name != scene_name
+    }
+    tables = {"body": bodies, "hinge": hinges}
+    return {table: name_table for table, name_table in tables.items() if name_table}

@@ -1,0 +1,348 @@
+"""Reader of URDF files.
+
+The axes of a link are those of its inboard joint.  The axis of a joint is in these axes, its origin
+in those of the parent.  <inertial> has its own frame, about whose origin the inertia is given.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+from ...argument_validation import abbreviate
+from ...errors import SceneError
+from ...numerics.pose import IDENTITY_POSE, Pose
+from ...numerics.rotations import Matrix, Vector, from_rpy, perpendicular_vector, product, transpose
+from ..validators.inertia import negative_moment_message, without_rounding
+from ..validators.validation_messages import did_you_mean
+from .robot_model import FIXED, NOTHING, ImportNote, Joint, Link, Mimic, Robot, Visual, color
+from .xml_reader import Element, parse_xml
+
+
+class _JointType(NamedTuple):
+    """Type of joint: its hinge type, the key of its axis, and the unit of a single coordinate."""
+
+    joint: str
+    hinge: str
+    axis: str = ""
+    unit: str = ""
+
+
+_JOINT_TYPES = {
+    kind.joint: kind
+    for kind in (
+        _JointType("revolute", "pin", "axis", "rad"),
+        _JointType("continuous", "pin", "axis", "rad"),
+        _JointType("prismatic", "prismatic", "axis", "m"),
+        _JointType("planar", "planar", "normal"),
+        _JointType("fixed", FIXED),
+        _JointType("floating", "free"),
+        _JointType("spherical", "ball"),
+    )
+}
+_UNLIMITED_TYPE = "continuous"
+#: Limit of effort and velocity that means none: readers of URDF require a value.
+NO_LIMIT = 1e9
+#: Joint types without limits -> types with limits; and joint types by hinge type.
+LIMITED_TYPES = {_UNLIMITED_TYPE: "revolute"}
+JOINT_TYPES_BY_HINGE = {kind.hinge: kind for kind in _JOINT_TYPES.values()}
+_SUPPORTED_TAGS = ("link", "joint", "material")
+
+
+class _SupportedContent(NamedTuple):
+    """Supported attributes of an element, and supported children: once, or any number of times."""
+
+    attributes: tuple[str, ...]
+    once: tuple[str, ...] = ()
+    often: tuple[str, ...] = ()
+
+
+#: Supported elements of a robot; elements with other tags are ignored with their content.
+_SUPPORTED_CONTENT = {
+    "link": _SupportedContent(("name", "type"), ("inertial",), ("visual", "collision")),
+    "inertial": _SupportedContent((), ("origin", "mass", "inertia")),
+    "mass": _SupportedContent(("value",)),
+    "inertia": _SupportedContent(("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
+    "visual": _SupportedContent(("name",), ("origin", "geometry", "material")),
+    "joint": _SupportedContent(
+        ("name", "type"), ("parent", "child", "origin", "axis", "dynamics", "limit", "mimic")
+    ),
+    "origin": _SupportedContent(("xyz", "rpy")),
+    "parent": _SupportedContent(("link",)),
+    "child": _SupportedContent(("link",)),
+    "axis": _SupportedContent(("xyz",)),
+    "dynamics": _SupportedContent(("damping", "friction")),
+    "limit": _SupportedContent(("lower", "upper", "effort", "velocity")),
+    "mimic": _SupportedContent(("joint", "multiplier", "offset")),
+}
+_MATERIAL_TAG = "material"
+
+
+def read_urdf(content: bytes, where: str) -> Robot:
+    """Read a robot from a URDF file; `where` is its name in messages.  Raises SceneError."""
+    root = parse_xml(content, where)
+    if root.tag != "robot":
+        raise SceneError(f"{root.where}: expected <robot>, found <{root.tag[:40]}>")
+    if any(child.tag.startswith("xacro:") for child in root.children):
+        raise SceneError(f"{where}: this is a xacro file; expand it with xacro FILE > robot.urdf")
+    reader = _UrdfReader(root)
+    links = tuple(map(reader.link, root.all("link")))
+    joints = tuple(map(reader.joint, root.all("joint")))
+    ignored_counts = Counter(
+        child.tag for child in root.children if child.tag not in _SUPPORTED_TAGS
+    )
+    for tag, count in ignored_counts.items():
+        reader.note(root, f"<{tag}>", f"left out, {count} of them" if count > 1 else "left out")
+    name = root.attributes.get("name", "")
+    return Robot(
+        name, where, links, joints, tuple(reader.mimics), tuple(reader.looks), tuple(reader.notes)
+    )
+
+
+class _UrdfReader:
+    """Reader of links and joints that also collects notes, visuals and mimics."""
+
+    def __init__(self, root: Element) -> None:
+        self.notes, self.looks, self.mimics = list[ImportNote](), list[Visual](), list[Mimic]()
+        self._colors = {
+            material.attributes.get("name", ""): colour
+            for material in root.all(_MATERIAL_TAG) if (colour := _material_colour(material))
+        }  # fmt: skip
+
+    def note(self, at: Element, element: str, text: str) -> None:
+        """Add a note about an element."""
+        self.notes.append(ImportNote(at.where, element, text))
+
+    def _note_unread(self, one: Element, owner: str) -> None:
+        """Add notes about repeated elements, and unknown elements and attributes, of an owner."""
+        supported = _SUPPORTED_CONTENT.get(one.tag)
+        if supported is None:
+            return
+        unknown_keys = [key[:40] for key in one.attributes if key not in supported.attributes]
+        if unknown_keys:
+            more_text = f" and {len(unknown_keys) - 6} more" if len(unknown_keys) > 6 else ""
+            note_text = (
+                f"unknown attributes of <{one.tag}> left out: "
+                f"{', '.join(unknown_keys[:6])}{more_text}"
+            )
+            self.note(one, owner, note_text)
+        for tag, count in Counter(child.tag for child in one.children).items():
+            if tag not in (*supported.once, *supported.often):
+                self.note(one, owner, f"<{tag[:40]}> in <{one.tag}> left out")
+            elif count > 1 and tag in supported.once:
+                note_text = (
+                    f"<{tag}> is given {count} times; the first applies, the others are left out"
+                )
+                self.note(one, owner, note_text)
+        for child in one.children:
+            self._note_unread(child, owner)
+
+    def link(self, one: Element) -> Link:
+        name = one.text("name")
+        self._note_unread(one, f"link {name!r}")
+        self._looks_of(one, name)
+        inertial = one.first("inertial")
+        if inertial is None:
+            return Link(name, where=one.where)
+        frame, mass = _origin_pose(inertial), inertial.first("mass")
+        mass_value = 0.0 if mass is None else mass.number("value", 0.0, "kg")
+        if mass_value < 0:
+            raise SceneError(
+                f"{inertial.where}: link {name!r}: expected a mass of 0 kg or more, found "
+                f"{mass_value:g}"
+            )
+        given_inertia = _inertia_matrix(inertial.first("inertia"))
+        inertia = without_rounding(given_inertia, mass_value)
+        if mass_value > 0 and inertial.first("inertia") is None:
+            self.note(one, f"link {name!r}", "a mass without <inertia>: a point mass")
+        elif mass_value == 0 and inertia != NOTHING:
+            self.note(one, f"link {name!r}", "moments of inertia without a mass")
+        if inertia != given_inertia:
+            self.note(one, f"link {name!r}", "moments of inertia below 0 by rounding set to 0")
+        rotated_inertia = product(product(frame.rotation, inertia), transpose(frame.rotation))
+        link = Link(name, mass_value, frame.position, _symmetric_part(rotated_inertia), one.where)
+        if negative_text := negative_moment_message(inertia):
+            self.note(one, f"link {name!r}", f"accepted unchanged: {negative_text}")
+        return link
+
+    def joint(self, one: Element) -> Joint:
+        name, type_name = one.text("name"), one.text("type")
+        self._note_unread(one, f"joint {name!r}")
+        joint_type = _JOINT_TYPES.get(type_name)
+        if joint_type is None:
+            hint = did_you_mean(type_name, _JOINT_TYPES)
+            raise SceneError(f"{one.where}: joint {name!r}: unknown type {type_name!r}{hint}")
+        ends = []
+        for tag in ("parent", "child"):
+            end = one.first(tag)
+            if end is None:
+                raise SceneError(f"{one.where}: joint {name!r} has no <{tag} link=...>; add it")
+            ends.append(end.text("link"))
+        keys = dict[str, Any]()
+        if joint_type.axis:
+            axis = self._axis(one, name)
+            keys = {joint_type.axis: axis} | (
+                {} if joint_type.unit else {"axis2": perpendicular_vector(axis)}
+            )
+        if joint_type.unit:
+            keys |= self._law(one, name, joint_type.unit, limited=type_name != _UNLIMITED_TYPE)
+        mimic = one.first("mimic")
+        if mimic is not None and not joint_type.unit:
+            self.note(one, f"joint {name!r}", f"its <mimic> is left out: a {type_name} joint")
+        elif mimic is not None:
+            self.mimics.append(Mimic(
+                name, mimic.text("joint"), mimic.number("multiplier", 1.0, "the other's unit"),
+                mimic.number("offset", 0.0, joint_type.unit),
+            ))  # fmt: skip
+        return Joint(name, joint_type.hinge, ends[0], ends[1], _origin_pose(one), keys, one.where)
+
+    def _axis(self, one: Element, name: str) -> Vector:
+        axis = one.first("axis")
+        x, y, z = (1.0, 0.0, 0.0) if axis is None else axis.numbers("xyz", (1.0, 0.0, 0.0), "1")
+        squared_length = x * x + y * y + z * z
+        if squared_length == 0:
+            raise SceneError(f"{one.where}: joint {name!r}: expected an axis that is not zero")
+        if abs(squared_length - 1) > 1e-3:
+            self.note(one, f"joint {name!r}", "its axis is normalised to length 1")
+        return (x, y, z)
+
+    def _law(self, one: Element, name: str, unit: str, limited: bool) -> dict[str, Any]:
+        """Law keys of a joint from <dynamics> and <limit>; limits become stops only on request."""
+        law: dict[str, Any] = {}
+        if (dynamics := one.first("dynamics")) is not None:
+            for key, key_unit in (("damping", "N m s/rad or N s/m"), ("friction", "N m or N")):
+                number = dynamics.number(key, 0.0, key_unit)
+                if number < 0:
+                    self.note(one, f"joint {name!r}", f"{key} below 0 left out")
+                elif number > 0:
+                    law[key] = number if key == "damping" else {"coulomb": number}
+        limit = one.first("limit")
+        if limit is not None and limited:
+            lower, upper = (limit.number(key, 0.0, unit) for key in ("lower", "upper"))
+            if lower < upper:
+                law["limits"] = {"lower": lower, "upper": upper}
+            elif {"lower", "upper"} & set(limit.attributes):
+                note_text = f"limits from {lower:g} to {upper:g} leave no range and are left out"
+                self.note(one, f"joint {name!r}", note_text)
+        rated = {**law.get("limits", {}), **({} if limit is None else self._rated(limit, name))}
+        return ({"law": law} if law else {}) | ({"rated": rated} if rated else {})
+
+    def _rated(self, limit: Element, name: str) -> dict[str, float]:
+        """Largest effort and speed of a joint, kept as its rating."""
+        given_limits, unread_texts = dict[str, float](), list[str]()
+        for key, unit in (("effort", "N m or N"), ("velocity", "rad/s or m/s")):
+            if key in limit.attributes:
+                try:
+                    given_limits[key] = limit.number(key, 0.0, unit)
+                except SceneError:
+                    unread_texts.append(f"{key} {abbreviate(limit.attributes[key])}")
+        ratings = {
+            key: number
+            for key, number in given_limits.items()
+            if number >= 0 and number != NO_LIMIT
+        }
+        if ratings:
+            note_text = "limits of effort and velocity have no effect; they are kept as rated"
+            self.note(limit, f"joint {name!r}", note_text)
+        if unread_texts:
+            note_text = f"limits that are not finite numbers left out: {', '.join(unread_texts)}"
+            self.note(limit, f"joint {name!r}", note_text)
+        if any(number < 0 for number in given_limits.values()):
+            self.note(limit, f"joint {name!r}", "limits of effort or velocity below 0 left out")
+        return ratings
+
+    def _looks_of(self, one: Element, link: str) -> None:
+        """Collect the visuals of a link, or its collision shapes where none can be drawn."""
+        is_drawn = [self._look(link, visual) for visual in one.all("visual")]
+        if all(is_drawn):
+            return
+        collision_drawn = (
+            []
+            if any(is_drawn)
+            else [self._look(link, collision) for collision in one.all("collision")]
+        )
+        note_text = (
+            "drawn by its collision shapes" if any(collision_drawn) else "not all of it is drawn"
+        )
+        self.note(one, f"link {link!r}", note_text)
+
+    def _look(self, link: str, visual: Element) -> bool:
+        """Collect a visual; return whether it is drawn.
+
+        Errors only add a note: visuals do not affect the motion.
+        """
+        try:
+            return self._shape(link, visual)
+        except SceneError as error:
+            self.notes.append(ImportNote(visual.where, f"link {link!r}", f"not drawn: {error}"))
+            return False
+
+    def _shape(self, link: str, visual: Element) -> bool:
+        geometry = visual.first("geometry")
+        if geometry is None or not geometry.children:
+            return True
+        keys = _shape_keys(geometry.children[0])
+        if keys is None:
+            return False
+        if (material := visual.first(_MATERIAL_TAG)) is not None:
+            colour = _material_colour(material) or self._colors.get(
+                material.attributes.get("name", "")
+            )
+            keys |= {"color": colour} if colour else {}
+        self.looks.append(Visual(link, _origin_pose(visual), keys))
+        return True
+
+
+def _origin_pose(one: Element) -> Pose:
+    origin = one.first("origin")
+    if origin is None:
+        return IDENTITY_POSE
+    x, y, z = origin.numbers("xyz", (0.0, 0.0, 0.0), "m")
+    return Pose((x, y, z), from_rpy(origin.numbers("rpy", (0.0, 0.0, 0.0), "rad")))
+
+
+def _inertia_matrix(one: Element | None) -> Matrix:
+    keys = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    numbers = (0.0 if one is None else one.number(key, 0.0, "kg m^2") for key in keys)
+    xx, xy, xz, yy, yz, zz = numbers
+    return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def _symmetric_part(m: Matrix) -> Matrix:
+    """Symmetric part of a matrix, which removes differences by rounding."""
+    xy, xz, yz = ((m[i][j] + m[j][i]) / 2 for i, j in ((0, 1), (0, 2), (1, 2)))
+    return ((m[0][0], xy, xz), (xy, m[1][1], yz), (xz, yz, m[2][2]))
+
+
+def _shape_keys(one: Element) -> dict[str, Any] | None:
+    """Keys of a shape; None for one that is not drawn."""
+    if one.tag == "box":
+        size = one.numbers("size", (0.0, 0.0, 0.0), "m")
+        return {"type": "box", "size": size} if min(size) > 0 else None
+    if one.tag == "mesh":
+        file = one.attributes.get("filename", "")
+        return _mesh_keys(file, one.numbers("scale", (1.0, 1.0, 1.0), "1"))
+    lengths: dict[str, float] = {
+        key: one.number(key, 0.0, "m") for key in ("radius", "length") if key in one.attributes
+    }
+    required_keys = {"sphere": ("radius",), "cylinder": ("radius", "length")}.get(one.tag)
+    if required_keys is None or set(required_keys) != set(lengths) or min(lengths.values()) <= 0:
+        return None
+    return {"type": one.tag, **lengths}
+
+
+def _mesh_keys(file: str, scale: Vector | tuple[float, ...]) -> dict[str, Any] | None:
+    """Keys of a mesh; None for an unsupported format or unequal scale factors."""
+    is_readable = file.lower().endswith((".stl", ".obj")) and ".." not in file.split("/")
+    if not is_readable or len(set(scale)) != 1 or scale[0] <= 0:
+        return None
+    return {"type": "mesh", "file": file} | ({"scale": scale[0]} if scale[0] != 1 else {})
+
+
+def _material_colour(material: Element) -> str | None:
+    colour_element = material.first("color")
+    return (
+        None
+        if colour_element is None
+        else color(colour_element.numbers("rgba", (0.5, 0.5, 0.5, 1.0), "0 to 1")[:3])
+    )

@@ -1,0 +1,158 @@
+"""The page of a chart: one file that needs no network and no script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from mstmm.safe_text import escape_control_characters
+
+from .chart_points import Skipped
+from .chart_record import ChartRecord
+from .plot_elements import Entry, drawing
+from .svg import mark, svg
+from .tables import Table, advice, levels, points, recommendation, skip_reasons
+
+_STYLE = """
+:root { color-scheme: light; --ink: #1b1f24; --soft: #57606a; --line: #d5dae0; }
+* { box-sizing: border-box; }
+body { margin: 0; background: #fdfdfc; color: var(--ink); font: 15px/1.5 system-ui, sans-serif; }
+main { max-width: 66rem; margin: 0 auto; padding: 1.5rem 1.1rem 3rem; }
+h1 { font-size: 1.45rem; margin: 0 0 .3rem; overflow-wrap: anywhere; }
+h2 { font-size: 1.1rem; margin: 1.8rem 0 .5rem; }
+p { margin: .3rem 0; } .soft { color: var(--soft); font-size: .92rem; }
+.chart { display: flex; flex-wrap: wrap; gap: .6rem 1.2rem; align-items: flex-start; }
+.plane { flex: 1000 1 34rem; min-width: 0; overflow-x: auto; }
+.plane svg { display: block; width: 100%; min-width: 34rem; height: auto;
+  font: 12px system-ui, sans-serif; }
+.keys { flex: 1 1 9.5rem; columns: 9.5rem auto; max-width: 100%; column-gap: .8rem; margin: 0;
+  padding: 0; list-style: none; font-size: .82rem; line-height: 1.45; }
+.keys li { break-inside: avoid; white-space: nowrap; }
+.keys .head { font-weight: 600; margin-top: .2rem; break-after: avoid; }
+.keys svg { width: 1em; height: 1em; vertical-align: -.1em; margin-right: .35em; }
+.keys .note { color: var(--soft); padding-left: 1.35em; white-space: normal; }
+.keys .faint { color: var(--soft); }
+.grid { stroke: #e6e6e6; stroke-width: .8; } .axis { stroke: #555; fill: none; }
+.beyond { fill: #f1f1f1; } .tick { fill: #333; } .mid { text-anchor: middle; }
+.end { text-anchor: end; }
+.word { text-anchor: middle; font-size: 11.5px; paint-order: stroke; stroke: #fff;
+  stroke-width: 3px; pointer-events: none; }
+polyline { fill: none; stroke-linejoin: round; stroke-linecap: round; pointer-events: none; }
+.strong polyline { stroke-width: 1.9; } .faint polyline { stroke-width: .9; }
+.strong g, .faint g { stroke: #fff; stroke-width: .7; cursor: default; }
+svg .faint { opacity: .55; } .front { stroke: #111; stroke-width: 10; opacity: .15; }
+.best { fill: none; stroke: #111; pointer-events: none; }
+svg g g:hover { stroke: #111; stroke-width: 1.6; }
+table { border-collapse: collapse; font-size: .88rem; } .wide { overflow-x: auto; }
+th { text-align: left; font-weight: 600; color: var(--soft); }
+th, td { padding: .2rem .9rem .2rem 0; border-bottom: 1px solid var(--line); white-space: nowrap; }
+td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
+ul.left { font-size: .88rem; padding-left: 1.1rem; } summary { cursor: pointer; }
+"""
+
+
+def page(chart: ChartRecord) -> str:
+    """The whole page."""
+    made = drawing(chart)
+    keys = {name: i for i, name in enumerate(dict.fromkeys(line.name for line in made.lines))}
+    hover = "".join(
+        f".chart:has(.e{i}:hover) .plane g[class*=k]:not(.k{i}){{opacity:.08}}"
+        f".chart:has(.e{i}:hover) .plane .k{i}{{opacity:1}}"
+        for i in keys.values()
+    )
+    reference = chart.reference
+    body = [
+        f"<h1>{escape(escape_control_characters(made.title))}: cost against accuracy</h1>",
+        f'<p class="soft">{escape(_how(chart))}</p>',
+        f'<p class="soft">Reference: {escape(reference.made_by)}. Its own error is '
+        f"{reference.error:.1e}; errors below {reference.floor:.1e} may be its own. Scaling: "
+        f"{escape(escape_control_characters(reference.scaling))}.</p>",
+        *(f"<p>{escape(escape_control_characters(text))}</p>" for text in _of_scene(chart)),
+        '<div class="chart"><div class="plane">', svg(made, keys), "</div>",
+        _legend(made.legend, keys), "</div>",
+    ]  # fmt: skip
+    if made.beyond:
+        body.append(
+            f'<p class="soft">{made.beyond} of the points err by far more and lie beyond the '
+            "picture.</p>"
+        )
+    said = recommendation(chart)
+    said = said[:1].upper() + said[1:]
+    body += ["<h2>What to take</h2>", f"<p>{escape(escape_control_characters(said))}</p>"]
+    if chart.advice():
+        body.append(_html(advice(chart)))
+    if len(chart.levels) > 1:
+        body += ["<h2>Levels of model</h2>", _html(levels(chart))]
+    body += [
+        "<h2>All runs</h2>", f"<details><summary>{len(chart.points)} settings</summary>",
+        _html(points(chart)), "</details>", _left_out(chart.left_out),
+    ]  # fmt: skip
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
+        f"<title>{escape(escape_control_characters(made.title))}: cost against accuracy</title>\n"
+        f"<style>{_STYLE}{hover}</style>\n</head>\n<body>\n<main>\n"
+        + "\n".join(part for part in body if part)
+        + "\n</main>\n</body>\n</html>\n"
+    )
+
+
+def _how(chart: ChartRecord) -> str:
+    unit = "" if chart.reference.unit == "1" else f" in {chart.reference.unit}"
+    return (
+        f"{chart.t_end:g} s of motion. Errors: the largest of "
+        f"{escape_control_characters(chart.reference.measure)}"
+        f"{unit} over {chart.looked}. Times: processor time of the whole call of simulate, the "
+        f"least of several. Made in {chart.spent:.0f} s of a budget of {chart.budget:g} s. "
+        "Rest the pointer on a point, or on a name of the legend."
+    )
+
+
+def _of_scene(chart: ChartRecord) -> list[str]:
+    """What holds for all runs: that they end early, that nothing moves, what the scene warns of."""
+    ended = chart.reference.ended
+    found = [f"The runs do not reach {chart.t_end:g} s: {ended}."] if ended else []
+    if chart.reference.still:
+        found.append("Nothing moves in this scene: there is nothing to compare.")
+    return [*found, *(f"The scene warns: {text}" for text in chart.warnings)]
+
+
+def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
+    items = []
+    for entry in entries:
+        text = escape(escape_control_characters(entry.text))
+        if entry.look is None:
+            items.append(f'<li class="{"head" if entry.strong else "note"}">{text}</li>')
+            continue
+        key = f" e{keys[entry.text]}" if entry.text in keys else ""
+        shape = mark(entry.look, 7, 7, 5)
+        items.append(
+            f'<li class="{"strong" if entry.strong else "faint"}{key}"><svg viewBox="0 0 14 14" '
+            f'fill="{entry.look.colour}">{shape}</svg>{text}</li>'
+        )
+    return f'<ul class="keys">{"".join(items)}</ul>'
+
+
+def _left_out(entries: Sequence[Skipped]) -> str:
+    parts = []
+    for refused, heading in ((True, "Does not apply"), (False, "Left out")):
+        items = [
+            f"<li>{escape(escape_control_characters(text))}</li>"
+            for text in skip_reasons(entries, refused)
+        ]
+        if items:
+            parts.append(f'<h2>{heading}</h2><ul class="left">{"".join(items)}</ul>')
+    return "".join(parts)
+
+
+def _html(table: Table) -> str:
+    head, numbers, rows = table
+
+    def cells(row: Sequence[str], tag: str) -> str:
+        return "".join(
+            f"<{tag}{' class=n' * (i in numbers)}>{escape(escape_control_characters(cell))}</{tag}>"
+            for i, cell in enumerate(row)
+        )
+
+    lines = [f"<tr>{cells(head, 'th')}</tr>", *(f"<tr>{cells(row, 'td')}</tr>" for row in rows)]
+    return f'<div class="wide"><table>{"".join(lines)}</table></div>'

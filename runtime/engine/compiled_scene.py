@@ -1,0 +1,241 @@
+"""Compiled scene: packed for the engines, the basis of runs, results and models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, Self
+
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.scene import Scene
+
+from ..flexible.modal_body import ModalBody
+from ..kernels import kernel_store
+from ..packing import product_sweep
+from ..packing import scene_parameters as named_parameters
+from ..packing.coordinate_layout import Layout
+from ..packing.merging.simplification import LINKED, Simplification, Words
+from ..packing.packed_scene import PackedScene, resize
+from ..packing.scene_elements import Known
+from ..packing.scene_packing import pack, without_merging
+from .characteristic_scales import speed_scales
+from .compiled_linearisation import LinearisationCode
+from .fused_code import FusedCode, NoFusedCode
+from .input_update import with_input_values
+from .input_values import InputValue, apply_without_recompile, scene_with_inputs
+from .looped_engine import LoopedEngine
+from .loops.acceleration_refinement import count_tree_refinements
+from .loops.independent_speeds import IndependentSpeeds
+from .loops.loop_analysis import LoopStart
+
+#: Options of a compilation: fused code, accuracy of the plain product, sweep, simplifications.
+CompileOptions = tuple[Callable[[PackedScene, Known], FusedCode] | None, float | None, str, Words]
+
+
+class CompiledScene:
+    """Scene that is ready for evaluation.
+
+    Attributes:
+        scene: the given scene.
+        known: elements that are not prebuilt, by (kind, name).
+        looped: looped engine on the packed scene.
+        fusion: fused code of the scene.
+        closed: its closed loops, assembled; None for a tree.
+        sweep: "riccati", "refined" or "qr".
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        known: Known | None = None,
+        fusing: Callable[[PackedScene, Known], FusedCode] | None = None,
+        product_accuracy: float | None = None,
+        sweep: str = "riccati",
+        simplify: Words = LINKED,
+    ) -> None:
+        self.scene = scene
+        self._fusing, self._product_accuracy, self.sweep = fusing, product_accuracy, sweep
+        self._simplify = simplify if product_accuracy is None else LINKED
+        self.looped = LoopedEngine(
+            pack(scene, known, product_accuracy, sweep=sweep, simplify=self._simplify)
+        )
+        self.known = self.packed.elements.known
+        self.closed: LoopStart | None = None
+        if self.packed.system.closes:
+            try:
+                self.closed = LoopStart(self.looped, len(self.free_speeds))
+            except NumericalFailure as failure:
+                raise SceneError(f"scene: {failure}") from None
+            self.looped = self.closed.engine
+            if product_accuracy is not None:
+                product_sweep.attach(self.packed, product_accuracy)
+                resize(self.packed, self.packed.written.slots)
+        elif self.packed.refined:
+            self.packed.model.refines = count_tree_refinements(self.looped)
+        self.fusion: FusedCode = fusing(self.packed, self.known) if fusing else NoFusedCode()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the scene and the options; compiled code is looked for again when unpickled."""
+        return _unpickle, (type(self), self.scene, self._asked, self.fusion.library is not None)
+
+    @property
+    def _asked(self) -> CompileOptions:
+        return self._fusing, self._product_accuracy, self.sweep, self._simplify
+
+    @cached_property
+    def apart(self) -> LoopedEngine:
+        """Looped engine without merged bodies, for quantities of merged bodies or hinges."""
+        packed = without_merging(self.packed)
+        if packed is self.packed:
+            return self.looped
+        engine = LoopedEngine(packed)
+        return engine if self.closed is None else LoopStart(engine, len(self.free_speeds)).engine
+
+    @property
+    def simplifications(self) -> tuple[Simplification, ...]:
+        """Simplifications of the packed scene, which do not change its motion."""
+        return self.packed.simplified
+
+    @property
+    def packed(self) -> PackedScene:
+        """Packed scene: its numbers in internal frames."""
+        return self.looped.packed
+
+    @property
+    def engine(self) -> str:
+        """Engine in use: "fused" or "looped"."""
+        return "looped" if self.fusion.library is None else "fused"
+
+    @property
+    def engine_choice(self) -> str:
+        """Engine in use, with the reason."""
+        fused_code = self.fusion
+        if fused_code.library is not None:
+            return f"fused: {fused_code.note}"
+        if fused_code.obstacle:
+            return f"looped: {fused_code.obstacle}"
+        return "looped: fused code of this scene is not compiled yet; a long run or batch builds it"
+
+    @property
+    def layout(self) -> Layout:
+        """Layout of hinges and modes in q and u."""
+        return self.packed.layout
+
+    @property
+    def flexible(self) -> Mapping[str, ModalBody]:
+        """Data of the flexible bodies by name: modes, moments, stiffness, interface nodes."""
+        return self.packed.flexible
+
+    @cached_property
+    def free_speeds(self) -> tuple[int, ...]:
+        """Indices in u of the speeds that no drive prescribes."""
+        indices = list[int]()
+        for number, hinge in enumerate(self.packed.scene.hinges):
+            slots = self.layout.slots(number)
+            drive = hinge.drive or (None,) * slots.nu
+            if not hinge.is_weld:
+                indices += [slots.u + k for k in range(slots.nu) if drive[k] is None]
+        for slots in self.layout.modal.values():
+            indices += range(slots.u, slots.u + slots.nu)
+        return tuple(indices)
+
+    @cached_property
+    def increments(self) -> tuple[tuple[str, str], ...]:
+        """Name and unit of the tangent increment of every free speed.
+
+        They are those of the coordinate if its rate is the speed.
+        """
+        names_and_units = list[tuple[str, str]]()
+        for speed in self.free_speeds:
+            slots = self.layout.hinge_of_speed(speed)
+            k = speed - slots.u
+            if slots.straight:
+                names_and_units.append((f"{slots.name}.{slots.q_names[k]}", slots.q_units[k]))
+            else:
+                unit = slots.u_units[k].removesuffix("/s")
+                names_and_units.append((f"{slots.name}.{slots.u_names[k]}_increment", unit))
+        return tuple(names_and_units)
+
+    @cached_property
+    def freedom(self) -> IndependentSpeeds | None:
+        """Independent speeds of closed loops; None for a tree."""
+        if self.closed is None:
+            return None
+        return IndependentSpeeds(self.looped, self.free_speeds, speed_scales(self), self.closed)
+
+    @cached_property
+    def slopes(self) -> LinearisationCode:
+        """Linearisation of the scene by its fused code."""
+        return LinearisationCode(self.looped, self.fusion, self.free_speeds)
+
+    @property
+    def nq(self) -> int:
+        return self.looped.nq
+
+    @property
+    def nu(self) -> int:
+        return self.looped.nu
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of all parameters of the scene by name, such as "rod1.mass"."""
+        return named_parameters.scene_parameters(self.scene)
+
+    def with_parameters(self, changes: Mapping[str, float]) -> Self:
+        """Copy of this model with other parameter values.
+
+        Nothing is recompiled, unless the model is fused and a number that was exactly zero (or an
+        axis along a coordinate axis) changes; then other code is compiled or found in the cache.
+
+        Raises SceneError for an unknown name (the nearest one is suggested) or an invalid value.
+        """
+        return self._with(named_parameters.with_parameters(self.scene, changes))
+
+    def with_inputs(self, inputs: Mapping[str, InputValue]) -> Self:
+        """Copy of this model with other inputs, by name; nothing is recompiled.
+
+        An input is given as a number, as the name of a signal of the scene, as (times, values) with
+        linear interpolation (s; times increase), or as the keys of a [[signal]] that it follows:
+        {"times": ..., "values": ..., "interpolation": "cubic"}.
+
+        Raises SceneError for an unknown name (the nearest one is suggested) or an invalid value.
+        """
+        values = apply_without_recompile(self.scene, inputs)
+        if values is not None:
+            return self.renewed(with_input_values(self.packed, values))
+        return self._with(scene_with_inputs(self.scene, inputs))
+
+    def renewed(self, packed: PackedScene) -> Self:
+        """Copy of this model with the packed scene under other inputs, without validation.
+
+        The packed scene must fit the existing compiled code.
+        """
+        attributes = {
+            name: value for name, value in vars(self).items()
+            if not isinstance(getattr(type(self), name, None), cached_property)
+        }  # fmt: skip
+        copy = object.__new__(type(self))
+        copy.__dict__.update(attributes, scene=packed.described, looped=LoopedEngine(packed))
+        copy.fusion = self.fusion.under(packed.system)
+        return copy
+
+    def _with(self, scene: Scene) -> Self:
+        """Compile the same scene with other numbers, with the same options."""
+        recompiled = type(self)(scene, self.known, *self._asked)
+        recompiled.fusion.follow(self.fusion)
+        return recompiled
+
+
+def _unpickle(
+    kind: type[CompiledScene],
+    scene: Scene,
+    asked: CompileOptions,
+    fused: bool,
+) -> CompiledScene:
+    """Restore a pickled model, with its fused code if that is in the cache here."""
+    known, definitions = kernel_store.load_known(kernel_store.required_types(scene))
+    scene.check_types(definitions)
+    model = kind(scene, known, *asked)
+    if fused:
+        model.fusion.find()
+    return model

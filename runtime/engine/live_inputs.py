@@ -1,0 +1,69 @@
+"""Inputs among the numbers p of compiled code: their positions, and their values over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE
+
+if TYPE_CHECKING:
+    from ..packing.system import System
+
+Places = Sequence[tuple[int, int]]
+
+#: Index of the value among the numbers of a constant input; see `mstmm_input_now`.
+_VALUE_INDEX = 1
+
+
+class LiveInputs:
+    """Inputs of a system in the numbers p that its compiled code reads.
+
+    `read` are pairs (index among the numbers of all inputs, index in p).  `places` (inputs, COUNT)
+    are the indices in p, -1 for numbers that are not read; `varies` says whether any of them
+    changes with time or is `held` in memory.
+    """
+
+    def __init__(self, system: System, read: Places) -> None:
+        self._inputs = inputs = system.inputs
+        self.places: NDArray[np.int32] = np.full(
+            (len(inputs), NUMBERS_PER_PIECE), -1, dtype=np.int32
+        )
+        for entry, place in read:
+            self.places[entry // NUMBERS_PER_PIECE, entry % NUMBERS_PER_PIECE] = place
+        self._moving = [
+            i for i, channel in enumerate(inputs) if channel.varies and (self.places[i] >= 0).any()
+        ]
+        self._held = [
+            (i, place) for i, place in enumerate(system.held.places)
+            if place >= 0 and (self.places[i] >= 0).any()
+        ]  # fmt: skip
+
+    @property
+    def varies(self) -> bool:
+        """True if p changes with time."""
+        return bool(self._moving or self._held)
+
+    def now(self, p: Array, t: float, memory: Array) -> Array:
+        """Numbers p (np,) at time t (s) of a run, with held inputs from its `memory`."""
+        numbers = self.at(p, np.array([t])).reshape(-1).copy()
+        for i, place in self._held:
+            is_read = self.places[i] >= 0
+            pieces = np.where(np.arange(NUMBERS_PER_PIECE) == _VALUE_INDEX, memory[place], 0.0)
+            numbers[self.places[i, is_read]] = pieces[is_read]
+        return numbers
+
+    def at(self, p: Array, t: Array) -> Array:
+        """Numbers p (n, np) at times t (n,), s; p itself, (np,), if it is constant."""
+        if not self._moving:
+            return p
+        rows = np.repeat(p[None], len(t), axis=0)
+        for i in self._moving:
+            is_read = self.places[i] >= 0
+            pieces = np.array([self._inputs[i].at(time) for time in t.tolist()])
+            rows[:, self.places[i][is_read]] = pieces[:, is_read]
+        return rows

@@ -1,0 +1,106 @@
+"""Mobility of constraint rows: response of the free adjacent bodies to a unit load of a row.
+
+It is the reference for the pivots of the rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.ir.scene_structure import Key
+
+from ...packing.records.couplings import WrittenCoupling
+from ...packing.system import Numbers
+from ..looped_engine import LoopedEngine
+from .loop_workspace import LoopWorkspace
+
+
+def row_mobilities(numbers: LoopWorkspace) -> Array:
+    """Mobility J M^-1 J^T of both ends of every row (rows,), after a correction.
+
+    Rows between bodies without mass get the mean of the others.
+    """
+    mobility, body_masses = np.zeros(numbers.count), _BodyMasses(numbers.engine)
+    for closure in numbers.records.closures:
+        for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
+            if body >= 0:
+                columns, inverse = numbers.numbers_of(closure, name), body_masses.inverse(body)
+                for direction, row in closure.rows.items():
+                    column = columns[direction]
+                    mobility[row] += column @ inverse @ column
+    for coupling in numbers.records.couplings:
+        mobility[coupling.row] = _coupling_mobility(numbers, coupling, body_masses)
+    known_mobilities = mobility[mobility > 0]
+    mobility[~(mobility > 0)] = known_mobilities.mean() if len(known_mobilities) else 1.0
+    return mobility
+
+
+def _coupling_mobility(numbers: LoopWorkspace, one: WrittenCoupling, masses: _BodyMasses) -> float:
+    """Mobility C^T D^-1 C of a coupling, summed over its hinges.
+
+    D is that of the hinge's single body; a hinge that closes a loop counts as its rows do.
+    """
+    mobility, closures = 0.0, {closure.frame: closure for closure in numbers.records.closures}
+    for place in one.columns:
+        derivatives = numbers.slopes_of(one, place)
+        if place not in closures:
+            mobility += _hinge_mobility(numbers.engine, place, derivatives, masses)
+            continue
+        closure = closures[place]
+        for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
+            if body >= 0:
+                column = derivatives @ numbers.numbers_of(closure, name)[: len(derivatives)]
+                mobility += float(column @ masses.inverse(body) @ column)
+    return mobility
+
+
+def _hinge_mobility(engine: LoopedEngine, place: int, slopes: Array, masses: _BodyMasses) -> float:
+    body, lib = engine.packed.system.body(place), engine.lib
+    free_speeds = [k for k in range(body.nu) if not body.imposed[k]]
+    start = int(engine.packed.written.blocks[place]) + int(lib.MSTMM_BLOCK_FIXED)
+    start += int(lib.MSTMM_SPEED_H_FREE) * body.nu
+    motion_subspace = engine.workspace_array()[start : start + 6 * len(free_speeds)].reshape(
+        6, len(free_speeds)
+    )
+    inertia = motion_subspace.T @ masses.matrix(place) @ motion_subspace + np.diag(
+        np.array(body.rotor)[free_speeds]
+    )
+    return float(slopes[free_speeds] @ _pseudo_inverse(inertia) @ slopes[free_speeds])
+
+
+def _pseudo_inverse(matrix: Array) -> Array:
+    """Pseudo-inverse: directions without inertia do not move."""
+    return np.asarray(np.linalg.pinv(matrix, rcond=1e-12, hermitian=True), dtype=np.float64)
+
+
+class _BodyMasses:
+    """Mass matrices of single bodies about input ends, and inverses; equal bodies share them."""
+
+    def __init__(self, engine: LoopedEngine) -> None:
+        self.engine, self.which = engine, engine.packed.system.which
+        self.distinct = list(engine.packed.system.distinct)
+        self.known: dict[tuple[Key, Numbers], tuple[Array, Array]] = {}
+
+    def matrix(self, body: int) -> Array:
+        return self._both(body)[0]
+
+    def inverse(self, body: int) -> Array:
+        return self._both(body)[1]
+
+    def _both(self, body: int) -> tuple[Array, Array]:
+        body_record = self.distinct[int(self.which[body])]
+        kind = body_record.body, body_record.body_p
+        if kind not in self.known:
+            matrix = self._made(*kind)
+            self.known[kind] = matrix, _pseudo_inverse(matrix)
+        return self.known[kind]
+
+    def _made(self, body: Key, numbers: Numbers) -> Array:
+        upper_triangle, engine = np.zeros(21), self.engine
+        function = engine.packed.elements[body].functions["inertia"]
+        c_function = engine.ffi.cast("int (*)(const double *, double *)", function)
+        c_function(list(numbers), engine.ffi.from_buffer("double[]", upper_triangle))
+        matrix = np.zeros((6, 6))
+        matrix[np.triu_indices(6)] = upper_triangle
+        return matrix + np.triu(matrix, 1).T

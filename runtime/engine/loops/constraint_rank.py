@@ -1,0 +1,293 @@
+"""Rank of constraint rows: redundant rows of closed loops, and singular configurations.
+
+The rank is determined once, at a state in which the loops are closed, and in a metric of the
+hinges.  With true masses a heavy coupler makes independent rows look like rounding.  With any
+masses of bodies, parts attached to the hinges of a loop, as the rest of a long mast, do so too.
+The pivot of a row that is redundant up to a misfit is proportional to the square of the misfit.
+A row that is redundant here but not in closed states nearby indicates a singular pose.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import NumericalFailure
+
+from ...packing.loops.system_variants import LOCKED, by_hinges, geometric, length_of
+from ...packing.scene_packing import packed_system, without_merging
+from ..looped_engine import LoopedEngine
+from .loop_calls import REDUNDANT_PIVOT, LoopCalls
+from .self_stress import IndeterminateLoads, find_indeterminate_loads
+
+#: Closed states nearby: number, distance (rad, m), and the factor by which the coordinates of cut
+#: hinges, which only follow, may exceed it.
+_NEIGHBOUR_COUNT, _NEIGHBOUR_DISTANCE, _MAX_CUT_FACTOR = 3, 3e-2, 10.0
+#: Over this distance (rad, m) a row that is redundant up to a misfit leaves no gap that locks.
+_FAR_DISTANCE = 0.3
+#: A closed state nearer than this fraction of the requested distance is the pose itself.
+_MIN_DISTANCE_RATIO = 0.1
+#: Around a singular pose: maximum number of trials; distance (rad, m) over which, and relative
+#: deviation up to which, speeds without velocity errors must lead on from a state; its accuracy
+#: (rad, m).
+_MAX_TRIALS, _CONTINUATION_DISTANCE, _MAX_DEVIATION, _STATE_ACCURACY = 16, 3e-3, 0.2, 1e-8
+#: A row that is redundant here is redundant there too if its pivot is at most so many times larger,
+#: or at most rounding, relative to the mobility.
+_MAX_PIVOT_RATIO, _PIVOT_ROUNDING = 1e2, 1e-12
+#: Maximum number of steps to such a state, gap (m, rad) that counts as closed, initial compliance
+#: of rows, and compliance relative to the remaining gap.
+_MAX_STEPS, _CLOSED_GAP, _INITIAL_COMPLIANCE, _COMPLIANCE_PER_GAP = 200, 1e-9, 1e-6, 1e-2
+
+
+@dataclass(frozen=True)
+class Rank:
+    """Redundant rows of closed loops at a state.
+
+    Attributes:
+        here: rows that are redundant at the state.
+        always: those of them that are redundant in closed states nearby too.
+        going: those of these that are removed; the others may replace another row of their hinge
+            that becomes redundant in a pose farther away.
+        states: the examined states (nq,), the given one first.
+        open: the loads that redundant rows leave undetermined.
+        nearby: smallest number of redundant rows in any of the states.
+        stuck: motions that close the loops to first order all lead back to the pose, as with links
+            stretched out in line.
+    """
+
+    here: frozenset[int]
+    always: frozenset[int]
+    going: frozenset[int]
+    states: tuple[Array, ...]
+    open: IndeterminateLoads
+    nearby: int
+    stuck: bool = False
+
+
+def find_rank(engine: LoopedEngine, q: Array) -> Rank:
+    """Find the redundant rows at a closed state q (nq,) and around it."""
+    calls = geometric_loop_calls(engine, q)
+    pivot_levels = REDUNDANT_PIVOT * calls.mobility
+    redundant_here = _redundant_rows(calls, q, pivot_levels)
+    if not redundant_here:
+        return Rank(redundant_here, redundant_here, redundant_here, (q,), IndeterminateLoads(), 0)
+    raised_levels = _MAX_PIVOT_RATIO * np.abs(calls.pivots()) + _PIVOT_ROUNDING * calls.mobility
+    pivot_levels[list(redundant_here)] = np.minimum(pivot_levels, raised_levels)[
+        list(redundant_here)
+    ]
+    states, is_stuck = _states_around(calls, q, redundant_here, pivot_levels)
+    locking_gap = LOCKED * length_of(engine.packed.system)
+    is_stuck = is_stuck and not _is_misfit_only(calls, q, redundant_here, locking_gap)
+    redundant_there = [_redundant_rows(calls, state, pivot_levels) for state in states]
+    always_redundant, nearby = (
+        redundant_here.intersection(*redundant_there),
+        min(map(len, (redundant_here, *redundant_there))),
+    )
+    removed_rows = always_redundant.difference(
+        *(_interchangeable_rows(calls, state, always_redundant) for state in (q, *states[:1]))
+    )
+    loads = (
+        find_indeterminate_loads(calls, q, redundant_here - always_redundant)
+        if always_redundant
+        else IndeterminateLoads()
+    )
+    return Rank(
+        redundant_here, always_redundant, removed_rows, (q, *states), loads, nearby, is_stuck
+    )
+
+
+def _states_around(
+    calls: LoopCalls, q: Array, here: frozenset[int], level: Array
+) -> tuple[list[Array], bool]:
+    """Closed states nearby, and whether all motions to such states lead back.
+
+    Around a singular pose only states are used, if any, from which a motion leads on: others are
+    closed by rounding, or motions branch there.
+    """
+    random_generator, distances, states = np.random.default_rng(0), list[float](), list[Array]()
+
+    def found(settled: float) -> Array | None:
+        near_q = _closed_neighbour(
+            calls, q, random_generator.uniform(-1.0, 1.0, calls.engine.nu), settled
+        )
+        distances.extend([] if near_q is None else [_largest_change(calls, near_q - q)])
+        return near_q
+
+    states = [near_q for _ in range(_NEIGHBOUR_COUNT) if (near_q := found(np.inf)) is not None]
+    is_distant = bool(distances) and min(distances) >= _MIN_DISTANCE_RATIO * _NEIGHBOUR_DISTANCE
+    if is_distant and all(_redundant_rows(calls, near_q, level) == here for near_q in states):
+        return states, False
+    smooth_states = list[Array]()
+    for _ in range(_MAX_TRIALS):
+        near_q = found(_STATE_ACCURACY)
+        if near_q is None or distances[-1] < _MIN_DISTANCE_RATIO * _NEIGHBOUR_DISTANCE:
+            continue
+        if _continues_smoothly(
+            calls, near_q, random_generator.uniform(-1.0, 1.0, calls.engine.nu), level
+        ):
+            smooth_states.append(near_q)
+        if len(smooth_states) == _NEIGHBOUR_COUNT:
+            break
+    return smooth_states or states, max(
+        distances, default=_NEIGHBOUR_DISTANCE
+    ) < _MIN_DISTANCE_RATIO * _NEIGHBOUR_DISTANCE
+
+
+def _largest_change(calls: LoopCalls, change: Array) -> float:
+    """Largest change of q (nq,), without the coordinates of cut hinges, which follow."""
+    change_of_tree, packed = change.copy(), calls.engine.packed
+    for cut in packed.expanded.cuts:
+        if cut.constraint is None:
+            change_of_tree[packed.layout.hinges[cut.hinge].q_slice] = 0.0
+    return float(np.abs(change_of_tree).max(initial=0.0))
+
+
+def geometric_loop_calls(engine: LoopedEngine, q: Array) -> LoopCalls:
+    """Loop calls of a scene in the metric of its hinges, with mobilities of equal bodies.
+
+    Bodies that were merged for simplification are separate in it, with their welds.
+    """
+    packed = without_merging(engine.packed)
+    mobility = LoopCalls(LoopedEngine(packed_system(geometric(packed.system), packed)), q).mobility
+    slides = {
+        packed.hinge_position[hinge.name]: hinge.facts.slides
+        for hinge in packed.described.hinge if hinge.facts is not None
+    }  # fmt: skip
+    return LoopCalls(
+        LoopedEngine(packed_system(by_hinges(packed.system, slides), packed)), q, mobility
+    )
+
+
+def _interchangeable_rows(calls: LoopCalls, q: Array, left_out: frozenset[int]) -> frozenset[int]:
+    """Redundant rows that become independent if another row of their hinge is omitted.
+
+    They are kept, and the rows to use are chosen during the motion.  All hinges are tried at the
+    same time: the first omitted row of each instead of its first kept row, and so on.
+    """
+    rows_by_hinge = [set(closure.rows.values()) for closure in calls.records.closures]
+    omitted_and_kept = [
+        (sorted(rows & left_out), sorted(rows - left_out)) for rows in rows_by_hinge
+    ]
+    interchangeable: set[int] = set()
+    for omitted_index, kept_index in product(range(6), range(6)):
+        pairs = [
+            (o[omitted_index], k[kept_index])
+            for o, k in omitted_and_kept
+            if omitted_index < len(o) and kept_index < len(k)
+        ]
+        if pairs:
+            pivot_levels = REDUNDANT_PIVOT * calls.mobility
+            pivot_levels[list(left_out | {k for _, k in pairs})] = np.inf
+            pivot_levels[[o for o, _ in pairs]] = (
+                REDUNDANT_PIVOT * calls.mobility[[o for o, _ in pairs]]
+            )
+            interchangeable |= {o for o, _ in pairs} - _redundant_rows(calls, q, pivot_levels)
+    return frozenset(interchangeable)
+
+
+def _redundant_rows(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
+    """Rows whose pivots are below their level if the preceding rows are satisfied."""
+    for row, floor in enumerate(level.tolist()):
+        calls.records.judge(row, floor)
+    calls.correction(calls.slip, q, np.zeros(calls.engine.nu))
+    return frozenset(np.flatnonzero(calls.inverses() == 0.0).tolist())
+
+
+def _closed_neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Array | None:
+    """Closed state in the direction of speeds without velocity errors, to `settled` (rad, m).
+
+    None if these speeds lead to none.
+    """
+    try:
+        ahead_q = _move_along(calls, q, speeds, _NEIGHBOUR_DISTANCE, np.zeros(calls.count))
+        return None if ahead_q is None else _close(calls, ahead_q, settled)
+    except NumericalFailure:
+        return None
+
+
+def _is_misfit_only(calls: LoopCalls, q: Array, left: frozenset[int], apart: float) -> bool:
+    """True if the rows `left` are redundant up to a misfit.
+
+    A motion without them must lead far away in both directions, and leave gaps of these rows of at
+    most `apart` (m, rad).
+    """
+    pivot_levels = np.zeros(calls.count)
+    pivot_levels[list(left)] = np.inf
+    speeds = np.random.default_rng(0).uniform(-1.0, 1.0, calls.engine.nu)
+    try:
+        for distance in (_FAR_DISTANCE, -_FAR_DISTANCE):
+            ahead_q = _move_along(calls, q, np.sign(distance) * speeds, abs(distance), pivot_levels)
+            near_q = None if ahead_q is None else _close(calls, ahead_q, _STATE_ACCURACY, left)
+            if (
+                near_q is None
+                or _largest_change(calls, near_q - q) < _MIN_DISTANCE_RATIO * _FAR_DISTANCE
+            ):
+                return False
+            gaps = np.abs(calls.correction(calls.gap, near_q, np.zeros(calls.engine.nu))[1])
+            if gaps[list(left)].max() > apart:
+                return False
+    except NumericalFailure:
+        return False
+    return True
+
+
+def _continues_smoothly(calls: LoopCalls, q: Array, speeds: Array, level: Array) -> bool:
+    """True if speeds without velocity errors lead to closed states.
+
+    Rows with pivots below `level` are ignored.  False where motions branch.
+    """
+    try:
+        ahead_q = _move_along(calls, q, speeds, _CONTINUATION_DISTANCE, level)
+        near_q = None if ahead_q is None else _close(calls, ahead_q, _STATE_ACCURACY)
+    except NumericalFailure:
+        return False
+    if near_q is None or ahead_q is None:
+        return False
+    return _largest_change(calls, near_q - ahead_q) < _MAX_DEVIATION * _largest_change(
+        calls, ahead_q - q
+    )
+
+
+def _move_along(
+    calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array
+) -> Array | None:
+    """Move q (nq,) by `way` (rad, m) along speeds projected on the rows with pivots above `level`.
+
+    None if no such speeds remain.
+    """
+    for row, floor in enumerate(level.tolist()):
+        calls.records.judge(row, floor)
+    tangent = speeds + calls.correction(calls.slip, q, speeds)[0]
+    length = float(np.abs(tangent).max(initial=0.0))
+    if not length > 1e-9:
+        return None
+    near_q = calls.moved(q, tangent * (way / length))
+    factor = min(way / max(_largest_change(calls, near_q - q), _CLOSED_GAP), _MAX_CUT_FACTOR)
+    return calls.moved(q, tangent * (factor * way / length)) if factor > 1.0 else near_q
+
+
+def _close(
+    calls: LoopCalls, near: Array, settled: float, left: Collection[int] = ()
+) -> Array | None:
+    """Closed state (nq,) near a given one, to `settled` (rad, m), or None.
+
+    It satisfies all rows except those in `left`, redundant rows too.
+    """
+    zero_speeds, compliance = np.zeros(calls.engine.nu), _INITIAL_COMPLIANCE
+    for row in range(calls.count):
+        calls.records.judge(row, np.inf if row in left else 0.0)
+    for _ in range(_MAX_STEPS):
+        change, gaps = calls.correction(calls.gap, near, zero_speeds, compliance)
+        gaps[list(left)] = 0.0
+        largest_gap = float(np.abs(gaps).max(initial=0.0))
+        if largest_gap < _CLOSED_GAP and float(np.abs(change).max(initial=0.0)) < settled:
+            return near
+        near, compliance = (
+            calls.moved(near, change),
+            min(_INITIAL_COMPLIANCE, _COMPLIANCE_PER_GAP * largest_gap),
+        )
+    return None

@@ -1,0 +1,486 @@
+"""Closed loops of a model: assembly at the start, rank of the rows, and their description."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import LoopClosureError, MstmmError, NumericalFailure, SceneError
+
+from ...packing.initial_state import start_values
+from ...packing.loops.system_variants import LOCKED, choosing, keeping, length_of, without
+from ...packing.records.loops import LoopRecords
+from ...packing.scene_packing import packed_system
+from ..looped_engine import LoopedEngine
+from .acceleration_refinement import count_refinements, mass_ratio_text
+from .assembly import Assembly
+from .branches import Branch, BranchSearch, RequestedCoordinates
+from .constraint_rank import Rank, find_rank
+from .loop_calls import REDUNDANT_PIVOT, LoopCalls
+from .near_parallel_axes import MIN_COUNTING_ANGLE, find_skewed_axis, find_skewed_axis_by_gap
+from .redundant_drives import shared_drives_text
+from .rotor_assembly import RotorAssembly
+from .self_stress import outboard_axes
+
+#: Names of the rows of a hinge that closes a loop, by direction.
+_DIRECTION_NAMES = ("x", "y", "z", "mx", "my", "mz")
+#: Names of the row of a coupling of coordinates, and of one of speeds.
+_COUPLING_ROWS = ("expression", "speeds")
+#: Names of the rows of constraints by kind and direction; "hinge": a point on a curve.
+_CONSTRAINT_ROWS = {
+    "distance": ("length",), "plane": ("normal",), "rolling": ("x", "y", "normal"),
+    "hinge": ("", "across1", "across2"),
+}  # fmt: skip
+#: Largest position gap of a row that may still be redundant up to a misfit, relative to the length
+#: of the scene.
+_MAX_MISFIT = 1e-2
+#: Misfits of redundant rows that are rounding, relative to those that lock.
+_NEGLIGIBLE_MISFIT = 1e-3
+#: A pose is near a singular one if the strain is this many times that of the start.
+_SINGULAR_STRAIN_RATIO = 10.0
+#: Longest step (rad, m) along a branch.
+_MAX_BRANCH_STEP = 0.1
+#: Maximum number of hinges named in a message.
+_MAX_NAMES = 8
+
+
+@dataclass(frozen=True)
+class LoopAnalysis:
+    """Closed-loop analysis of a scene: cut hinges, rows, rank, redundancy and mobility.
+
+    Attributes:
+        cut: hinges that close loops; the choice of a loop's hinge affects only the computing time.
+        rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
+            for the outboard axis of the hinge nearest to its direction, "u1", ... for its own
+            speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
+            "across1" and "across2" of a curve.
+        rank: number of independent rows.
+        nearby: that number in closed states nearby; greater than `rank` in a singular pose.
+        redundant: redundant rows, so that the loads along them are not determined.
+        momentary: those of them that are redundant only in this pose.
+        not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
+            axes, and directions of the loads of constraints and couplings, by name, that rigid
+            bodies do not determine: results show one of many distributions.
+        misfit: the largest position gap (m, rad) at the start of rows that are redundant up to a
+            misfit, with the row; 0 and two empty strings if there is none.
+        mobility: number of free speeds.
+        shapes: number of these that are rates of the shapes of flexible bodies: all of them unless
+            some are needed to satisfy rows.
+        width: largest number of rows that are open across one hinge at a time.
+    """
+
+    cut: tuple[str, ...] = ()
+    rows: tuple[tuple[str, str], ...] = ()
+    rank: int = 0
+    nearby: int = 0
+    redundant: tuple[tuple[str, str], ...] = ()
+    momentary: tuple[tuple[str, str], ...] = ()
+    mobility: int = 0
+    width: int = 0
+    not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    misfit: tuple[float, str, str] = (0.0, "", "")
+    shapes: int = 0
+    found_by: Callable[[], tuple[Branch, ...]] = field(default=tuple, repr=False, compare=False)
+    decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
+
+    @property
+    def singular(self) -> bool:
+        """True if the start is a singular pose, with fewer independent rows than nearby."""
+        return self.nearby > self.rank
+
+    @property
+    def counted(self) -> str:
+        """Summary of rows, rank and mobility."""
+        shapes_text = f", of them {self.shapes} of shapes" if self.shapes else ""
+        speeds_text = "1 speed" if self.mobility == 1 else f"{self.mobility} speeds"
+        return f"{self.rank} of {len(self.rows)} rows count, {speeds_text} left{shapes_text}"
+
+    def repeated(self, most: int) -> str:
+        """List of `redundant` for messages, with at most `most` names."""
+        row_names = ", ".join(f"{word} of {name}" for name, word in self.redundant[:most])
+        return row_names + (" ..." if len(self.redundant) > most else "")
+
+    @property
+    def open_loads(self) -> str:
+        """List of `not_unique` for messages, with the first names."""
+        names_by_components: dict[tuple[str, ...], list[str]] = {}
+        for name, components in self.not_unique.items():
+            names_by_components.setdefault(components, []).append(name)
+        return "; ".join(
+            f"{' '.join(components)} of "
+            f"{', '.join(names[:_MAX_NAMES])}{' ...' if names[_MAX_NAMES:] else ''}"
+            for components, names in list(names_by_components.items())[:_MAX_NAMES]
+        )
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Branches on which the loops close with coordinates of `hold` kept, as far as found.
+
+        The first is nearest to the start and is that of the model.
+        """
+        return self.found_by()
+
+    @property
+    def independent(self) -> tuple[str, ...]:
+        """Names of the independent speeds, as many as the mobility.
+
+        They determine all others; mass matrices and linear models of the mechanism refer to them.
+        """
+        return self.decided_by()
+
+
+class LoopStart:
+    """Start of a scene with closed loops, and their analysis.
+
+    `engine` is the engine to use from then on, without the rows that are always redundant.
+    """
+
+    def __init__(self, engine: LoopedEngine, free_speeds: int) -> None:
+        packed, self.engine = engine.packed, engine
+        self._whole = engine  #: with all rows
+        self._found: tuple[Branch, ...] = ()
+        hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
+        held_hinges = [hinge.name for hinge in hinges if hinge.hold]
+        #: Hinges whose start speeds are kept.
+        self.fast = [
+            hinge.name for hinge in hinges
+            if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
+        ]  # fmt: skip
+        q, u = start_values(packed.scene, packed.layout, packed.flexible)
+        calls = LoopCalls(engine, q)
+        q, u = calls.driven(q, u)
+        length = length_of(packed.system)
+        try:
+            near_q = self._assembly(q, held_hinges).positions(q, _MAX_MISFIT * length)
+        except LoopClosureError as error:
+            extra_text = self._too_many(q, held_hinges, free_speeds)
+            raise LoopClosureError(f"{error}{extra_text}", error.gap, error.pose) from None
+        near_q = self._nearest(q, near_q, held_hinges, _MAX_MISFIT * length)
+        try:
+            self._begin(near_q, u, held_hinges, free_speeds, calls)
+        except LoopClosureError:  # the gap there is no misfit: it closes farther away
+            near_q = self._assembly(near_q, held_hinges).positions(
+                near_q, _MAX_MISFIT * length, rough=False
+            )
+            self.engine = engine
+            self._begin(near_q, u, held_hinges, free_speeds, calls)
+        if self._whole is not self.engine:
+            self.engine.packed.behind = partial(_open_loop_cause, self._whole, self.start[0])
+
+    def _begin(
+        self, near: Array, u: Array, holds: Collection[str], free_speeds: int, calls: LoopCalls
+    ) -> None:
+        """Find the rank of the rows near a state (nq,) that is closed up to misfits; start there.
+
+        `calls` are those of all rows.  Raises OpenLoop if independent rows do not close, SceneError
+        if the mechanism cannot move.
+        """
+        locking_gap = LOCKED * length_of(self.engine.packed.system)
+        self._keep(near)
+        self._whole = self.engine
+        self.loops, redundant_names = self._judged(near, free_speeds)
+        self._refuse_structure()
+        self.start = self._assembly(near, holds).positions(near), u
+        try:
+            self.start = self.assembled(near, u, holds, self.fast)
+        except SceneError:
+            self._refuse_locked(calls, redundant_names, locking_gap)
+            raise
+        self.engine.packed.model.loops_singular = int(self.loops.singular)
+        self.engine.packed.model.refines = count_refinements(
+            self.engine, *self.start, self.loops.mobility
+        )
+        self._refuse_locked(calls, redundant_names, locking_gap)
+
+    def _nearest(self, q: Array, near: Array, holds: Collection[str], much: float) -> Array:
+        """Return `near`, to which steps from the start q (nq,) lead, or a nearer branch's state."""
+        self._wishes = RequestedCoordinates(self.engine.packed, q, holds)
+        search = BranchSearch(self._assembly(q, holds), self._wishes, near, much)
+        if search.is_near():
+            return near
+        nearest_q = search.nearest()
+        self._found = search.found
+        return nearest_q
+
+    @property
+    def branches(self) -> tuple[Branch, ...]:
+        """Branches on which the loops close, as far as found, the nearest to the start first.
+
+        If the start was closed, the search happens at the first access.
+        """
+        if not self._found:
+            held_hinges = self._wishes.kept
+            search = BranchSearch(
+                self._assembly(self.start[0], held_hinges), self._wishes, self.start[0]
+            )
+            self._found = search.found
+        return self._found
+
+    def nearest(
+        self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float
+    ) -> tuple[Array, Array]:
+        """Assemble as `assembled`, on that of the branches found that is nearest to q."""
+        assembly = self._assembly(q, holds, t)
+        near_q = assembly.positions(q)
+        search = BranchSearch(
+            assembly, RequestedCoordinates(self.engine.packed, q, holds, stated=False), near_q
+        )
+        near_q = near_q if search.is_near() else search.nearest()
+        return near_q, self._assembly(near_q, fast, t).speeds(near_q, u)
+
+    def led(self, q: Array, to: Array, holds: Collection[str], t: float = 0.0) -> Array:
+        """Move the coordinates of `holds` from a closed q (nq,) to those of `to` on one branch.
+
+        The steps are small, so that the state stays on its branch; drives and couplings have their
+        values at t (s).  Raises OpenLoop if the branch ends before.
+        """
+        layout, is_kept = self.engine.packed.layout, np.zeros(len(q), bool)
+        driven = {hinge.name for hinge in self.engine.packed.described.hinge if hinge.drive}
+        for name in {*holds, *driven}:
+            is_kept[layout.hinges[name].q_slice] = True
+        change = np.where(is_kept, to - q, 0.0)
+        steps = max(1, math.ceil(float(np.abs(change).max(initial=0.0)) / _MAX_BRANCH_STEP))
+        for k in range(1, steps + 1):
+            next_q = np.where(is_kept, to - change * (1.0 - k / steps), q)
+            q = self._assembly(next_q, {*holds, *driven}, t).positions(next_q)
+        return q
+
+    def assembled(
+        self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float = 0.0
+    ) -> tuple[Array, Array]:
+        """Nearest (q, u) that satisfies all constraints at t (s).
+
+        The coordinates of `holds` and the speeds of `fast` are kept.  Raises SceneError if there is
+        none.
+        """
+        q = self._assembly(q, holds, t).positions(q)
+        return q, self._assembly(q, fast, t).speeds(q, u)
+
+    def _assembly(self, q: Array, hinges: Collection[str], t: float = 0.0) -> Assembly:
+        return RotorAssembly(self.engine, q, hinges, self._sharing, t)
+
+    def _sharing(self, q: Array) -> str:
+        """End of a message about drives of the same degree of freedom near q, or ""."""
+        return shared_drives_text(self._whole, q)
+
+    def _keep(self, q: Array) -> None:
+        """Give couplings without a value the one that they have at q."""
+        packed = self.engine.packed
+        if any(coupling.kept is None for coupling in packed.system.couplings):
+            values = LoopCalls(self.engine, q).values()
+            self.engine = LoopedEngine(
+                packed_system(keeping(packed.system, values.tolist()), packed)
+            )
+
+    def _judged(
+        self, q: Array, free_speeds: int
+    ) -> tuple[LoopAnalysis, dict[int, tuple[str, str]]]:
+        """Analyse the loops near q; also the rows that are always redundant, by index."""
+        rank, calls = find_rank(self.engine, q), LoopCalls(self.engine, q)
+        packed, records = self.engine.packed, calls.records
+        names, load_names = self._names(calls), dict(rank.open.loads)
+        for name, word in (names[row] for row in sorted(rank.open.rows)):
+            if name not in packed.layout.hinges:
+                load_names[name] = (*load_names.get(name, ()), word)
+        if rank.stuck and not self._is_led:
+            remedy = (
+                "give the flexible bodies there axial shapes too, or let one of their ends slide"
+            )
+            if not packed.flexible:
+                remedy = "change a length or the place of a hinge slightly, so that they close in"
+                remedy += " more than this pose"
+            raise SceneError(
+                f"scene: {_closing_elements_text(names[row][0] for row in sorted(rank.here))} in "
+                f"a pose that no "
+                f"motion leaves, stretched out or folded in line; "
+                f"{find_skewed_axis(packed, MIN_COUNTING_ANGLE) or remedy}"
+            )
+        imposed_rows = [row for row in range(calls.count) if not records.yields(row)]
+        independent_count = len(imposed_rows) - len(rank.here)
+        couplings = {
+            record.coupling.name for record in records.couplings if record.row in rank.going
+        }
+        removed_rows = {
+            (record.frame, direction)
+            for record in records.closures
+            for direction, row in record.rows.items() if row in rank.going
+        }  # fmt: skip
+        chosen_counts = _independent_counts(records, rank)
+        remaining_system = choosing(without(packed.system, removed_rows, couplings), chosen_counts)
+        mobility = free_speeds - self._shared() - independent_count
+        modal_speed_count = sum(slots.nu for slots in packed.layout.modal.values())
+        if packed.releases:
+            # Rows redundant now may be needed after a release: every evaluation decides.
+            for row in rank.going:
+                records.judge(row, REDUNDANT_PIVOT * float(calls.mobility[row]))
+        elif rank.always:
+            self.engine = LoopedEngine(packed_system(remaining_system, packed))
+            calls = LoopCalls(self.engine, q)
+            records = calls.records
+        rounding_rows, redundant_names = (
+            calls.judge_by(rank.states),
+            {names[row] for row in rank.here},
+        )
+        packed = self.engine.packed
+        packed.model.loops_strain = _SINGULAR_STRAIN_RATIO * min(map(calls.strain, rank.states))
+        rounding_names = [
+            name for row, name in enumerate(self._names(calls)) if row in rounding_rows
+        ]
+        self._refuse_drowned([name for name in rounding_names if name not in redundant_names])
+        analysis = LoopAnalysis(
+            tuple(cut.hinge for cut in packed.expanded.cuts if cut.constraint is None),
+            tuple(names), independent_count, len(imposed_rows) - rank.nearby,
+            tuple(names[row] for row in sorted(rank.here)),
+            tuple(names[row] for row in sorted(rank.here - rank.always)),
+            mobility, records.width, load_names, shapes=min(mobility, modal_speed_count),
+        )  # fmt: skip
+        return analysis, {row: names[row] for row in sorted(rank.always)}
+
+    def _too_many(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
+        """End of a message if more coordinates are held than are free near q, else ""."""
+        count = sum(self.engine.packed.layout.hinges[name].nu for name in holds)
+        try:
+            near_q = Assembly(self.engine, q).positions(q)
+            self._keep(near_q)
+            mobility = self._judged(near_q, free_speeds)[0].mobility
+        except MstmmError:  # it does not close without held coordinates either
+            return ""
+        if count <= mobility:
+            return ""
+        freedom_text = "1 degree of freedom" if mobility == 1 else f"{mobility} degrees of freedom"
+        return (
+            f"; hold keeps {count} coordinate{'s' * (count > 1)}, the mechanism has {freedom_text}"
+        )
+
+    def _refuse_structure(self) -> None:
+        """Raise SceneError if no motion is free and none is prescribed over time."""
+        if self.loops.mobility > 0 or self._is_led:
+            return
+        remedy = find_skewed_axis(self.engine.packed, MIN_COUNTING_ANGLE)
+        remedy = remedy or "use a hinge with more coordinates, or replace a hinge by a [[spring]]"
+        raise SceneError(
+            f"scene: no degree of freedom is left, and "
+            f"{_closing_elements_text(name for name, _ in self.loops.rows)}: a structure; {remedy}"
+        )
+
+    def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
+        """Raise NumericalFailure for independent rows that the masses hide in rounding."""
+        if rows:
+            name, direction = rows[0]
+            raise NumericalFailure(
+                f'direction {direction} of the loop closed by "{name}" is lost to rounding: '
+                f"{mass_ratio_text(self.engine)}"
+            )
+
+    @property
+    def _is_led(self) -> bool:
+        """True if drives, couplings that depend on time, or releases may move the mechanism."""
+        packed = self.engine.packed
+        is_driven = any(coupling.goes_by_time for coupling in packed.described.coupling)
+        return is_driven or bool(packed.system.driven or packed.releases)
+
+    def _refuse_locked(
+        self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
+    ) -> None:
+        """Raise SceneError if a redundant row leaves a gap that the others do not close."""
+        q, u = self.start
+        gaps = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
+        velocity_errors = np.abs(calls.correction(calls.slip, q, u)[1])
+        coupling_rows = [coupling.row for coupling in calls.records.couplings]
+        gaps[coupling_rows] = np.maximum(gaps, velocity_errors)[coupling_rows]
+        worst_row = max(repeating, key=lambda row: float(gaps[row]), default=None)
+        if worst_row is not None and gaps[worst_row] > much * _NEGLIGIBLE_MISFIT:
+            self.loops = replace(self.loops, misfit=(float(gaps[worst_row]), *repeating[worst_row]))
+        for row, (closing, direction) in repeating.items():
+            if gaps[row] > much:
+                if direction in _COUPLING_ROWS:
+                    raise SceneError(
+                        f'scene: coupling "{closing}" contradicts other constraints by '
+                        f"{gaps[row]:.3g} at the start; omit it, or correct its expression"
+                    )
+                raise SceneError(
+                    f"scene: direction {direction} of {calls.closing(row)} is redundant, violated "
+                    f"by {gaps[row]:.3g}: "
+                    f"{self._sharing(q) or self._locking(float(gaps[row]))}"
+                )
+
+    def _locking(self, gap: float) -> str:
+        """End of a message about a gap (m, rad) that no motion closes, with a remedy."""
+        remedy = find_skewed_axis_by_gap(self.engine.packed, gap)
+        remedy = remedy or "make axes parallel and points meet, or use a ball or cylindrical hinge"
+        return f"as a rigid mechanism it would lock; {remedy}"
+
+    def _shared(self) -> int:
+        """Number of free speeds of cut hinges, which the tree counts already."""
+        system = self.engine.packed.system
+        frames = [system.body(closure.frame) for closure in system.closures]
+        return sum(frame.nu - sum(frame.imposed) for frame in frames)
+
+    def _names(self, calls: LoopCalls) -> list[tuple[str, str]]:
+        """Names (hinge, direction) of every row."""
+        names, system = [("", "")] * calls.count, self.engine.packed.system
+        for closure in calls.records.closures:
+            hinge, _, table = calls.engine.hinge_name(closure.frame).partition("/")
+            if table:
+                for direction, row in closure.rows.items():
+                    names[row] = (hinge, _CONSTRAINT_ROWS[closure.kind][direction])
+                continue
+            speeds = system.body(closure.frame).nu
+            constrained_directions = [direction for direction in range(6) if direction >= speeds]
+            axes = outboard_axes(calls, closure.frame)
+            W = calls.numbers_of(closure, "W")[constrained_directions].reshape(-1, 2, 3) @ axes
+            direction_names = dict(
+                zip(
+                    constrained_directions,
+                    _distinct_directions(np.abs(W.reshape(-1, 6))),
+                    strict=True,
+                )
+            )
+            for direction, row in closure.rows.items():
+                names[row] = (hinge, direction_names.get(direction, f"u{direction + 1}"))
+        for coupling in calls.records.couplings:
+            names[coupling.row] = (
+                coupling.coupling.name, _COUPLING_ROWS[coupling.coupling.of_speeds]
+            )  # fmt: skip
+        return names
+
+
+def _independent_counts(records: LoopRecords, rank: Rank) -> dict[int, int]:
+    """Number of independent rows of closures with interchangeable rows, by place of the frame."""
+    rows_by_frame = {closure.frame: {*closure.rows.values()} for closure in records.closures}
+    interchangeable_rows = rank.always - rank.going
+    return {
+        frame: len(rows - rank.always) - sum(map(records.yields, rows))
+        for frame, rows in rows_by_frame.items() if rows & interchangeable_rows
+    }  # fmt: skip
+
+
+def _open_loop_cause(engine: LoopedEngine, q: Array) -> str:
+    """Cause of loops that close at the start q (nq,) but not later, with a remedy.
+
+    Empty if neither drives nor axes are the cause.
+    """
+    return shared_drives_text(engine, q) or find_skewed_axis(engine.packed, MIN_COUNTING_ANGLE)
+
+
+def _closing_elements_text(closing: Iterable[str]) -> str:
+    """Phrase that names the elements that close loops, the first ones only."""
+    names = [f'"{name}"' for name in dict.fromkeys(closing)]
+    return (
+        f"loops close at {', '.join(names[:_MAX_NAMES])}{' ...' if len(names) > _MAX_NAMES else ''}"
+    )
+
+
+def _distinct_directions(sizes: Array) -> list[str]:
+    """Distinct names of n directions (n, 6); the largest components choose first."""
+    direction_names, remaining = [""] * len(sizes), sizes.copy()
+    for _ in direction_names:
+        row, column = np.unravel_index(remaining.argmax(), remaining.shape)
+        direction_names[row] = _DIRECTION_NAMES[column]
+        remaining[row], remaining[:, column] = -1.0, -1.0
+    return direction_names

@@ -1,0 +1,68 @@
+"""Results of the last correction of closed loops in the workspace."""
+
+from __future__ import annotations
+
+from mstmm.array_validation import Array
+
+from ...packing.records.couplings import WrittenCoupling
+from ...packing.records.loops import WrittenClosure
+from ..looped_engine import LoopedEngine
+
+
+class LoopWorkspace:
+    """Access to the workspace of rows, closures and couplings of one packed scene."""
+
+    def __init__(self, engine: LoopedEngine) -> None:
+        records = engine.packed.written.loops
+        assert records is not None
+        self.engine, self.records = engine, records
+        self.count = records.count
+
+    def closing(self, row: int) -> str:
+        """Name of the element to which a row belongs, for messages."""
+        for closure in self.records.closures:
+            if row in closure.rows.values():
+                return self.engine.closing(closure.frame)
+        return f'coupling "{self.coupling_of(row)}"'
+
+    def coupling_of(self, row: int) -> str:
+        """Name of the coupling to which a row belongs, or ""."""
+        names = (
+            coupling.coupling.name for coupling in self.records.couplings if coupling.row == row
+        )
+        return next(names, "")
+
+    def inverses(self) -> Array:
+        """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
+        return self._of_rows("INVERSE")
+
+    def pivots(self) -> Array:
+        """Pivots of the rows in the last correction."""
+        return self._of_rows("PIVOT")
+
+    def _of_rows(self, name: str) -> Array:
+        lib, stride = self.engine.lib, int(self.engine.lib.MSTMM_ROW)
+        first = self.records.place + int(getattr(lib, f"MSTMM_ROW_{name}"))
+        return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
+
+    def values(self) -> Array:
+        """Values of the couplings in the last correction of gaps."""
+        first = self.records.place + int(self.engine.lib.MSTMM_COUPLING_GAP)
+        indices = [first + coupling.numbers for coupling in self.records.couplings]
+        return self.engine.workspace_array()[indices]
+
+    def slopes_of(self, one: WrittenCoupling, place: int) -> Array:
+        """Derivatives -C (nu,) of a coupling on the speeds of one of its hinges.
+
+        Valid after a correction.
+        """
+        start = self.records.place + one.columns[place]
+        return self.engine.workspace_array()[
+            start : start + self.engine.packed.system.body(place).nu
+        ]
+
+    def numbers_of(self, one: WrittenClosure, name: str) -> Array:
+        """Matrix (6, 6) of a closure after a correction: W, J_A or J_B."""
+        start = self.records.place + one.numbers
+        start += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
+        return self.engine.workspace_array()[start : start + 36].reshape(6, 6).copy()

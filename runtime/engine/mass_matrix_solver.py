@@ -1,0 +1,89 @@
+"""Solutions with the mass matrix, M^-1 times columns, by the looped engine or compiled code."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import EnvironmentFailure
+
+from .fused_code import FusedCode
+from .looped_engine import LoopedEngine
+
+if TYPE_CHECKING:
+    from ..kernels.derivative_library import DerivativeLibrary
+
+#: Time of a compilation, s, constant and per squared number of speeds, and time that its code saves
+#: per state and per number of the right-hand sides; measured.  Only ratios matter; the values are
+#: fixed for reproducible choices.
+_COMPILE_SECONDS, _COMPILE_SECONDS_PER_PAIR = 0.2, 0.005
+_SAVED_PER_STATE, _SAVED_PER_NUMBER = 1e-5, 3e-8
+
+
+class MassMatrixSolver:
+    """Solver with the mass matrix of one scene.  Safe to call from several threads."""
+
+    def __init__(self, engine: LoopedEngine, fusion: FusedCode) -> None:
+        self._engine, self._fusion = engine, fusion
+        self._lock = threading.Lock()
+        self._saved = 0.0
+        self._library: DerivativeLibrary | None = None
+        self._looked = False
+        self._obstacle = ""
+
+    def solve(self, q: Array, columns: Array) -> Array:
+        """Solutions (n, k, nu) for columns (n, k, nu) at n states q (n, nq).
+
+        Raises NumericalFailure that names a motion without inertia.
+        """
+        if not columns.size:
+            return columns.copy()
+        library = self._expect(len(q), columns.size)
+        if library is not None:
+            solutions = self._fused(library, q, columns)
+            if solutions is not None:
+                return solutions
+        rows = [
+            self._engine.solve(q_row, column_rows)
+            for q_row, column_rows in zip(q, columns, strict=True)
+        ]
+        return np.array(rows).reshape(columns.shape)
+
+    def build(self) -> None:
+        """Compile the code of the scene now.  EnvironmentFailure if that fails."""
+        with self._lock:
+            self._library = self._fusion.solution(build=True)
+
+    @property
+    def compiled(self) -> bool:
+        """True if compiled code of the scene is in use."""
+        return self._library is not None
+
+    def _expect(self, states: int, numbers: int) -> DerivativeLibrary | None:
+        """Compiled code if it exists or would have saved the time of its compilation."""
+        with self._lock:
+            self._saved += states * _SAVED_PER_STATE + numbers * _SAVED_PER_NUMBER
+            is_worthwhile = (
+                self._saved > _COMPILE_SECONDS + _COMPILE_SECONDS_PER_PAIR * self._engine.nu**2
+            )
+            if self._library is None and not self._obstacle and (is_worthwhile or not self._looked):
+                self._looked = True
+                try:
+                    self._library = self._fusion.solution(build=is_worthwhile)
+                except EnvironmentFailure as error:
+                    self._obstacle = str(error)
+            return self._library
+
+    def _fused(self, library: DerivativeLibrary, q: Array, columns: Array) -> Array | None:
+        """Solutions by compiled code; None if a guard fails: the looped engine names the cause."""
+        numbers, nu = self._fusion.numbers, self._engine.nu
+        zero_speeds = np.zeros((1, nu))
+        memory = self._engine.start_memory()[None]
+        inputs = [numbers[None], np.zeros((1, 1)), q, zero_speeds, memory, zero_speeds]
+        solution_rows = library.run(0, inputs, columns)
+        if not solution_rows[..., nu].all() or not np.isfinite(solution_rows).all():
+            return None
+        return np.ascontiguousarray(solution_rows[..., :nu])

@@ -1,0 +1,240 @@
+"""Residual of a packed scene and its tangent, by the looped engine in O(bodies).
+
+R(t, q, u, a) are the efforts that the accelerations a need in addition to all acting loads; a are
+the accelerations of the motion if R = 0.  With closed loops the loads of their multipliers act too,
+and for closing hinges R is the error of their accelerations.  Implicit steps, equilibria and linear
+models need R and its tangent, which is eliminated from the tips to the root
+(derive/equations/tangent_sweep.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from mstmm.array_validation import Array, Integers
+from mstmm.errors import SceneError
+
+from .off_tree_coupling import off_tree_coupling
+
+if TYPE_CHECKING:
+    from .looped_engine import LoopedEngine
+
+
+class TangentMatrix:
+    """Residual and tangent of one scene; each thread needs its own.
+
+    Prescribed and held speeds have no rows: their entries in residuals and solutions are zero.
+    """
+
+    def __init__(self, engine: LoopedEngine, memory: Array | None = None) -> None:
+        self.engine = engine
+        packed, ffi = engine.packed, engine.ffi
+        self.nq, self.nu = engine.nq, engine.nu
+        self.state = np.zeros(self.nq), np.zeros(self.nu)
+        slopes = packed.slopes()
+        model = packed.model
+        self.memory = engine.start_memory() if memory is None else memory
+        self.workspace = np.zeros(packed.workspace)
+        self.numbers = np.zeros(max(1, _lay_out_tangent(engine)))
+        self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
+        across = off_tree_coupling(engine)
+        self.couplings, self.coupled = across.written(engine), across.count
+        self.answers = np.zeros(max(1, len(across.passes) * self.nu))
+        self.closure = np.zeros(self.coupled * (across.width + 4) + 1)
+        self.record = record = ffi.new("mstmm_tangent *")
+        record.model, record.slots = model, slopes.slots
+        record.couplings, record.n_coupled = self.couplings[0], self.coupled
+        for name in ("workspace", "memory", "work", "numbers", "answers", "closure"):
+            setattr(record, name, engine.pointer(getattr(self, name)))
+
+    def residual(self, t: float, q: Array, u: Array, a: Array | None = None) -> Array:
+        """Residual R (nu,) at a state, to which the other calls refer from now on.
+
+        Without `a` the accelerations of the state are used; multipliers of closed loops are those
+        of the state.
+        """
+        r, null = np.empty(self.nu), self.engine.ffi.NULL
+        self.state = np.array(q, float), np.array(u, float)
+        self._call("residual", float(t), q, u, null if a is None else a, r, null)
+        return r
+
+    def accelerations_rate(self) -> Array:
+        """Partial derivative (nu,) of the accelerations with respect to time.
+
+        At the state of a residual without `a`; afterwards a tangent must be factored again.
+        """
+        rate = np.empty(self.nu)
+        self._call("accelerations_rate", rate)
+        return rate
+
+    def slope(self, d_t: float, d_q: Array, d_u: Array, d_a: Array) -> Array:
+        """Derivative (nu,) of R along a direction of time, coordinates, speeds, accelerations."""
+        derivative = np.empty(self.nu)
+        self._call("residual_slope", float(d_t), d_q, d_u, d_a, derivative)
+        return derivative
+
+    def matrices(self, t: float, q: Array, u: Array, a: Array, free: Sequence[int]) -> Array:
+        """Matrices M, C and K (3, n, n) about a state, to which other calls refer from now on.
+
+        They are the derivatives of R with respect to the accelerations of the speeds `free`, to
+        these speeds, and to the increments of coordinates along them.
+        """
+        n, engine = len(free), self.engine
+        matrices_found, work = np.empty((3, n, n)), np.empty(2 * self.nq + 3 * self.nu)
+        self.state = np.array(q, float), np.array(u, float)
+        state_pointers = map(engine.pointer, (*self.state, np.ascontiguousarray(a, float)))
+        result_pointers = map(engine.pointer, (matrices_found, work))
+        speed_indices = engine.ffi.new("int[]", free)
+        if engine.lib.mstmm_linear_swept(
+            self.record, t, *state_pointers, n, speed_indices, *result_pointers
+        ):
+            raise engine.failed(self.record.failure, t, *self.state)
+        return matrices_found
+
+    def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
+        """Factor the derivative of R along unknowns x.
+
+        du = rate x, da = s x and dq = (sq - kappa g_q)^-1 N x, where N u are the rates of the
+        coordinates and g_q their derivatives with respect to the coordinates.
+        """
+        self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
+
+    def factor_laws(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
+        """Factor a cheap approximation of the tangent, with arguments as in `factor`.
+
+        It contains inertia and the symmetric part of the derivatives of laws and modes only.
+        """
+        self._call("laws_factor", float(rate), float(s), float(sq), float(kappa))
+
+    def solve(self, r: Array, d_q: Array | None = None, d_a: Array | None = None) -> Array:
+        """Solve for x (nu,) that changes R by r (nu,), with known changes in addition.
+
+        Known are changes of coordinates (nq,) and accelerations (nu,), which must be zero for
+        prescribed speeds.
+        """
+        x, known_record, known_changes = np.empty(self.nu), self.engine.ffi.NULL, None
+        if d_q is not None or d_a is not None:
+            known_changes = (
+                np.zeros(self.nq) if d_q is None else np.ascontiguousarray(d_q, float),
+                np.zeros(self.nu) if d_a is None else np.ascontiguousarray(d_a, float),
+            )
+            known_record = self.engine.ffi.new(
+                "mstmm_known *", tuple(map(self.engine.pointer, known_changes))
+            )
+        self._call("tangent_solve", np.ascontiguousarray(r, float), known_record, x)
+        return x
+
+    def solve_laws(self, r: Array, d_q: Array | None = None, d_u: Array | None = None) -> Array:
+        """Changes (nu,) of accelerations that change R by r (nu,), after `factor_laws`.
+
+        Known changes of coordinates (nq,) and speeds (nu,) are added.
+        """
+        changes = np.empty(self.nu)
+        zeros = np.zeros(self.nu)
+        known_changes = (zeros if d_q is None else d_q, zeros if d_u is None else d_u)
+        self._call("laws_solve", r, *known_changes, changes)
+        return changes
+
+    def count_negative(self) -> int | None:
+        """Number of negative eigenvalues of the last factored, symmetric tangent.
+
+        By Sylvester's law of inertia it is that of its pivots.  None if loads couple distant
+        bodies, which the pivots do not contain.  Factorisations with negative pivots fail unless
+        `allow_negative` was called before.
+        """
+        if self.coupled:
+            return None
+        sizes, pivots = self.pivots()
+        return int(count_negative(pivots[None], sizes)[0])
+
+    def pivots(self) -> tuple[Integers, Array]:
+        """Sizes n (2 bodies,) of the pivots of the last factorisation, and their numbers.
+
+        Each body has a pivot of its shapes and one of its hinge; the numbers (sum of n^2,) of
+        hinges are those of the inverse.
+        """
+        engine, read_pivots = self.engine, self.engine.lib.mstmm_tangent_pivots
+        sizes = np.zeros(2 * engine.packed.system.count, dtype=np.int32)
+        size_pointer = engine.ffi.from_buffer("int[]", sizes)
+        pivots = np.zeros(read_pivots(self.record, size_pointer, engine.ffi.NULL))
+        read_pivots(self.record, size_pointer, engine.pointer(pivots))
+        return sizes.astype(np.int64), pivots
+
+    def allow_negative(self) -> None:
+        """Accept negative pivots from now on, for callers that count them."""
+        self.record.counts = 1
+
+    def rates(self, q: Array, u: Array) -> Array:
+        """Rates N(q) u (nq,), zero for prescribed coordinates; invalidates the residual's state."""
+        dq = np.zeros(self.nq)
+        self._call("tangent_rates", q, u, dq)
+        return dq
+
+    def coordinates(self, x: Array, rho: Array | None = None) -> Array:
+        """Change dq (nq,) of coordinates along x: sq dq = kappa g_q dq + N x + rho."""
+        dq = np.zeros(self.nq)
+        null = self.engine.ffi.NULL
+        self._call("tangent_coordinates", x, null if rho is None else rho, dq)
+        return dq
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        pointer = self.engine.pointer
+        missing_size = self.engine.packed.workspace - len(self.workspace)
+        if missing_size > 0:  # tapes of events have been appended since
+            self.workspace = np.append(self.workspace, np.zeros(missing_size))
+            self.record.workspace = pointer(self.workspace)
+        c_arguments = [
+            pointer(np.ascontiguousarray(argument, float))
+            if isinstance(argument, np.ndarray)
+            else argument
+            for argument in arguments
+        ]
+        if getattr(self.engine.lib, f"mstmm_{name}")(self.record, *c_arguments):
+            t = float(self.record.t)
+            raise self.engine.failed(self.record.failure, t, *self.state)
+
+
+def thread_tangent(engine: LoopedEngine) -> TangentMatrix:
+    """Tangent of an engine for this thread, with no releases and no turns counted."""
+    thread_data, size = engine.local, engine.packed.workspace
+    if getattr(thread_data, "tangent_of", None) != size:
+        thread_data.tangent = TangentMatrix(engine)
+        thread_data.tangent_of = engine.packed.workspace
+    return cast(TangentMatrix, thread_data.tangent)
+
+
+def count_negative(pivots: Array, sizes: Integers) -> Integers:
+    """Count negative eigenvalues (k,) in rows of pivots (k, sum of n^2), without zeros."""
+    squares = np.square(sizes)
+    firsts = np.cumsum(squares) - squares
+    counts = np.zeros(len(pivots), dtype=np.int64)
+    for n in sorted(set(sizes.tolist()) - {0}):
+        indices = firsts[sizes == n][:, None] + np.arange(n * n)
+        blocks = pivots[:, indices].reshape(len(pivots), -1, n, n)
+        values = np.linalg.eigvalsh(blocks) if n > 1 else blocks
+        counts += (values < 0).reshape(len(pivots), -1).sum(axis=1)
+    return counts
+
+
+def _lay_out_tangent(engine: LoopedEngine) -> int:
+    """Number of values that the tangent stores.
+
+    SceneError for elements that were generated by an old version without derivatives.
+    """
+    packed = engine.packed
+    count = int(engine.lib.mstmm_tangent_lay(packed.model))
+    if count < 0:
+        place = -1 - count
+        force = place - packed.system.count
+        if force < 0:
+            culprit = f'"{engine.hinge_name(place)}" or its body'
+        else:
+            culprit = f'"{packed.scene.forces[force].name}"'
+        raise SceneError(
+            f"scene: {culprit} uses an element that was generated by an earlier mstmm, without "
+            "the derivatives that implicit methods need; regenerate it: mstmm generate FILE"
+        )
+    return count

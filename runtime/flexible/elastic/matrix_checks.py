@@ -1,0 +1,200 @@
+"""Whether matrices describe an elastic body that is free in space: refused by name if not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .finite_element_model import ElasticModel
+
+#: Largest difference of mirrored entries, of the largest entry.
+SYMMETRIC = 1e-9
+#: Largest force of a rigid-body motion, of the sum of its terms' magnitudes: files with seven
+#: digits pass.
+RIGID = 1e-6
+#: Negative eigenvalues below this part of the diagonal are rounding.
+DEFINITE = 1e-9
+#: Most multiplications of a factorisation row by row, unknowns numbered for the least: about half a
+#: minute for the one that is used, which needs a tenth of them.
+MOST_WORK = 5e11
+#: Smallest entry of a matrix, square of a frequency and length, and the inverse of the largest.
+_TINY = 1e-60
+_MOTIONS = ("translation along x", "translation along y", "translation along z",
+            "rotation about x", "rotation about y", "rotation about z")  # fmt: skip
+
+
+def check_matrices(model: ElasticModel) -> ElasticModel:
+    """The model with exactly symmetric matrices.
+
+    Raises SceneError, one sentence with what was expected and found and a way out, for matrices
+    that are unsymmetric or indefinite, a stiffness that resists rigid-body motions (a model that is
+    held somewhere), a mass that depends on the direction, and bodies in several pieces.
+    """
+    model = replace(
+        model,
+        mass=_symmetric(model, "mass", model.mass),
+        stiffness=_symmetric(model, "stiffness", model.stiffness),
+        scalar_mass=None
+        if model.scalar_mass is None
+        else _symmetric(model, "scalar_mass", model.scalar_mass),
+    )
+    _sizes(model)
+    _one_piece(model)
+    _affordable(model)
+    _definite(model, "mass", model.mass, "kg")
+    _equal_masses(model)
+    _rigid_motions(model)
+    _definite(model, "stiffness", model.stiffness, "N/m")
+    _scalar_mass(model)
+    return model
+
+
+def _sizes(model: ElasticModel) -> None:
+    """Can products of the matrices and the squares of the frequencies be written as numbers?"""
+    mass, stiffness = float(abs(model.mass).max()), float(abs(model.stiffness).max())
+    sizes = (mass, stiffness, stiffness / mass, model.size)
+    if not all(_TINY < size < 1 / _TINY for size in sizes):
+        raise model.refuse(
+            f"expected masses and stiffnesses of a real body, found up to {mass:.3g} kg and "
+            f"{stiffness:.3g} N/m over {model.size:.3g} m, beyond what can be computed with; check "
+            "the units (m, kg/m^3, N/m^2)"
+        )
+
+
+def _symmetric(model: ElasticModel, key: str, matrix: Any) -> Any:
+    from scipy import sparse
+
+    difference, largest = abs(matrix - matrix.T), float(abs(matrix).max())
+    if largest == 0.0:
+        raise model.refuse(f"{key}: expected a matrix of an elastic body, found only zeros")
+    worst = float(difference.max())
+    if worst > SYMMETRIC * largest:
+        entries = difference.tocoo()
+        place = int(np.argmax(entries.data))
+        i, j = int(entries.row[place]), int(entries.col[place])
+        raise model.refuse(
+            f"{key}: expected a symmetric matrix, found {matrix[i, j]:.6g} in row {i}, column {j} "
+            f"and {matrix[j, i]:.6g} in row {j}, column {i} (counted from 0); where only one "
+            "triangle was stored, add the other one"
+        )
+    return sparse.csr_array((matrix + matrix.T) / 2)
+
+
+def _one_piece(model: ElasticModel) -> None:
+    from scipy.sparse.csgraph import connected_components
+
+    pieces, labels = connected_components(_joined(model), directed=False)
+    if pieces > 1:
+        first = int(np.flatnonzero(labels != labels[0])[0])
+        raise model.refuse(
+            f"stiffness: expected one connected body, found {pieces} pieces (node {first}, counted "
+            f"from 0, is not joined to node 0); join them, or leave out nodes without elements"
+        )
+
+
+def _joined(model: ElasticModel) -> Any:
+    """Sparse (N, N): which nodes push on which."""
+    from scipy.sparse import csr_array
+
+    d, n = model.unknowns, len(model.nodes)
+    entries = model.stiffness.tocoo()
+    places = (entries.row // d, entries.col // d)
+    return csr_array((np.ones(entries.nnz, np.int8), places), shape=(n, n))
+
+
+def _affordable(model: ElasticModel) -> None:
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    joined = _joined(model).tocoo()
+    place = np.empty(len(model.nodes), np.int64)
+    place[reverse_cuthill_mckee(joined.tocsr(), symmetric_mode=True)] = np.arange(len(place))
+    rows, columns = place[joined.row], place[joined.col]
+    reach = np.zeros(len(place))
+    np.maximum.at(reach, rows, np.maximum(rows - columns, 0).astype(float))
+    work = model.unknowns**3 * float(np.sum(reach**2))
+    if work > MOST_WORK:
+        raise model.refuse(
+            f"stiffness: expected a body whose {model.stiffness.shape[0]} unknowns can be solved "
+            f"for with {MOST_WORK:.0e} multiplications (half a minute), found {work:.1e}; take "
+            "fewer divisions or a coarser mesh (a slender or thin body may have many more than a "
+            "compact one), or name the matrices of a reduced model in `matrices`"
+        )
+
+
+def _definite(model: ElasticModel, key: str, matrix: Any, unit: str) -> None:
+    """No negative eigenvalue beyond rounding, by the signs of the pivots of the scaled matrix."""
+    if model.definite:
+        return
+    diagonal = matrix.diagonal()
+    row = int(np.argmin(diagonal))
+    if diagonal[row] < 0:
+        raise model.refuse(
+            f"{key}: expected a positive semidefinite matrix, found {diagonal[row]:.6g} on the "
+            f"diagonal in row {row} (counted from 0); check signs and the order of the unknowns"
+        )
+    negative = negative_pivots(matrix, DEFINITE)
+    if negative:
+        raise model.refuse(
+            f"{key}: expected a positive semidefinite matrix ({unit}), found {negative} negative "
+            f"eigenvalue{'s' if negative > 1 else ''}; check how it was assembled"
+        )
+
+
+def negative_pivots(matrix: Any, shift: float) -> int:
+    """Eigenvalues below -shift of the symmetric matrix scaled to a unit diagonal."""
+    from scipy import sparse
+    from scipy.sparse.linalg import splu
+
+    diagonal = matrix.diagonal()
+    scale = 1 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
+    scaled = sparse.diags_array(scale) @ matrix @ sparse.diags_array(scale)
+    shifted = sparse.csc_array(scaled + shift * sparse.eye_array(matrix.shape[0]))
+    options = {"SymmetricMode": True}
+    lu = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+    return int(np.count_nonzero(lu.U.diagonal() < 0))
+
+
+def _equal_masses(model: ElasticModel) -> None:
+    block, mass = model.inertia[:3, :3], float(np.trace(model.inertia[:3, :3]) / 3)
+    worst = float(np.max(np.abs(block - mass * np.eye(3))))
+    if not mass > 0 or worst > RIGID * mass:
+        values = ", ".join(f"{value:.6g}" for value in np.diag(block))
+        raise model.refuse(
+            f"mass: expected the same mass in kg along x, y and z, found {values}; check the order "
+            'of the unknowns ("node" or "component") and that no unknown was left out'
+        )
+
+
+def _rigid_motions(model: ElasticModel) -> None:
+    stiffness, motions = model.stiffness, model.rigid
+    force = np.max(np.abs(stiffness @ motions), axis=0)
+    terms = np.max(abs(stiffness) @ np.abs(motions), axis=0)
+    share = force / np.where(terms > 0, terms, 1.0)
+    worst = int(np.argmax(share))
+    if share[worst] > RIGID:
+        raise model.refuse(
+            f"stiffness: expected no force in rigid-body motions, found {share[worst]:.2g} of the "
+            f"entries' own in a {_MOTIONS[worst]}: the model is held somewhere, or nodes and "
+            "unknowns are in different orders; give the matrices of the free body"
+        )
+
+
+def _scalar_mass(model: ElasticModel) -> None:
+    if model.scalar_mass is None:
+        return
+    if model.unknowns == 6:
+        raise model.refuse(
+            "scalar_mass: expected with 3 unknowns per node, found 6, whose rotations have a mass "
+            "of their own; leave it out"
+        )
+    largest = float(abs(model.scalar_mass).max())
+    one = model.mass[0::3][:, 0::3]
+    worst = float(abs(one - model.scalar_mass).max())
+    if worst > RIGID * largest:
+        raise model.refuse(
+            f"scalar_mass: expected the mass matrix of the unknowns along x, found entries that "
+            f"differ by {worst:.3g} of {largest:.3g} kg; leave it out, or check the order of the "
+            "nodes"
+        )

@@ -1,0 +1,96 @@
+"""Whose energy a motion is: bodies carry it, laws and shapes store it.
+
+Of a shape x the kinetic part of body b is x* M_b x over x* M x, where M_b is the mass matrix of the
+scene with the inertia of that body alone; the elastic part of coordinate j is conj(x_j) (K_e x)_j
+over x* K_e x.  Both come from passes over the bodies, without a matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+
+from .frozen_loads import with_frozen_springs, without_laws
+from .matrix_operators import Pencil
+
+if TYPE_CHECKING:
+    from ..engine.compiled_scene import CompiledScene
+    from .linear_equations import LinearEquations
+
+
+def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
+    """(n, k): a real operator times every shape, complex ones in two parts."""
+    columns = [
+        product(x.real) + (1j * product(x.imag) if np.iscomplexobj(x) else 0.0) for x in shapes.T
+    ]
+    return np.array(columns).reshape(len(columns), len(shapes)).T
+
+
+def kinetic(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
+    """Body -> (k,): its part of each shape's kinetic energy."""
+    return kinetic_of_speeds(linear.model, linear.state.q, linear.spread(shapes))
+
+
+def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
+    """Body -> (k,): its part of the kinetic energy of all speeds (nu, k) at q (nq,)."""
+    engine, parts = model.apart, [np.real(speeds)]
+    if np.iscomplexobj(speeds):
+        parts.append(np.imag(speeds))
+    energies = np.zeros((speeds.shape[1], engine.packed.topology.count))
+    for part in parts:
+        energies += engine.kinetic_energies(q, np.ascontiguousarray(part.T))
+    frames = {one.frame for one in engine.packed.system.closures}
+    bodies = [place for place in range(energies.shape[1]) if place not in frames]
+    names = [engine.body_name(place).partition("/")[0] for place in bodies]
+    return _parts(names, energies[:, bodies].T)
+
+
+def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
+    """Owner of coordinates, or "springs" -> (k,): its part of each shape's elastic energy."""
+    tree, free = linear.tree, list(linear.model.free_speeds)
+    shapes = linear.spread(shapes)[free]
+    whole, lawless, held = (
+        along(_pressed(linear, engine), shapes)
+        for engine in (tree, without_laws(tree), with_frozen_springs(tree, linear.state))
+    )
+    own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear.model, shapes)))
+    names = [name.rpartition(".")[0] for name, _ in linear.model.increments]
+    if not linear.model.scene.forces:
+        return _parts(names, own)
+    sprung = np.real(np.conj(shapes) * (lawless - held)).sum(axis=0)
+    return _parts([*names, "springs"], np.vstack([own, sprung]))
+
+
+def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
+    """K x of a scene, x' = G x + du."""
+    pencil = Pencil(engine, linear.state, list(linear.model.free_speeds))
+    turning = linear.turning if linear.mechanism is None else None
+    if turning is None:
+        return pencil.stiffness
+    return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)
+
+
+def _by_shapes(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
+    """(n, k): the stiffness of flexible bodies times increments x of all free speeds."""
+    moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
+    moved[list(model.free_speeds)] = x
+    pressed = np.zeros_like(moved)
+    for name, slots in model.layout.modal.items():
+        pressed[slots.u_slice] = model.flexible[name].K @ moved[slots.u_slice]
+    return pressed[list(model.free_speeds)]
+
+
+def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:
+    """Sums of rows (k,) by name over the sum of all; nan where there is none."""
+    found: dict[str, Array] = {}
+    for name, row in zip(names, energies, strict=True):
+        found[name] = found[name] + row if name in found else row
+    total = energies.sum(axis=0)
+    with np.errstate(all="ignore"):
+        return {name: np.where(np.abs(total) > 0, row / total, np.nan)
+                for name, row in found.items()}  # fmt: skip

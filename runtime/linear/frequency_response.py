@@ -1,0 +1,366 @@
+"""How a linear model answers harmonic pushes: H(i omega), outputs by inputs, O(bodies) each.
+
+The amplitudes of a push r exp(s t) are x = Z(s)^-1 r with Z(s) = s^2 M + s C + K, by one
+elimination from the tips to the root for every s.  A tree can resonate outboard of a hinge that is
+held fast though all of it does not (an absorber), where that elimination has a pole and loses
+digits.  The response is analytic there: its mean over a circle in the plane of s about the
+frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mstmm.array_validation import Array
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+
+from ..engine.characteristic_scales import speed_scales
+from ..engine.harmonic_response import HarmonicResponse
+from ..risk_checks.shape_range import response_range_risks
+from . import file_formats
+from .harmonic.damping_checks import is_requested, refuse_drives, refuse_in_motion, refuse_ratios
+from .harmonic.exact_beams import Chosen, ExactBeams, exact_beams, refuse_distributed, refuse_inner
+from .harmonic.harmonic_solve import Amplitudes
+from .harmonic.hysteretic_damping import Losses, stiffer
+from .harmonic.modal_damping import Ratios, modal_damping
+from .harmonic.steady_states import find_time_risks, refuse_turning, refuse_unsteady
+from .harmonic_loads import HarmonicLoads
+from .input_channels import Channel, channel, some_names
+from .mck_matrices import Matrices
+from .outputs.linear_outputs import outputs_of, read_by, rows_of
+from .outputs.output_rows import LinearQuantity
+from .validity import find_response_risks
+
+if TYPE_CHECKING:
+    from ..engine.looped_engine import LoopedEngine
+    from .linear_equations import LinearEquations
+
+Complex = NDArray[np.complex128]
+
+#: Numbers of one batch of frequencies.
+_BATCH = 2**20
+#: Growth of inertia in the elimination from which on digits are looked for elsewhere.
+_GROWN = 1e6
+#: Radii of circles in parts of the frequency, how many points they have, and negative powers of
+#: the distance from the centre that these tell from positive ones.
+_CIRCLES, _POINTS, _POLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 8, 3
+#: Parts of a response that may be unknown: good enough, and no answer any more.
+_GOOD, _LOST = 1e-11, 1e-3
+#: Responses below this part of what the amplitudes of all coordinates reach are rounding.
+_NOISE = 1e-11
+_ROUNDING = 2.0**-52
+#: Frequencies whose squares, times masses, are numbers.
+_FASTEST = 1e100
+
+
+@dataclass(frozen=True, eq=False)
+class FrequencyResponse(AssessedAnswer):
+    """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
+
+    Attributes:
+        omega: (k,) rad/s, as asked for.
+        inputs, outputs: names.
+        input_units, output_units: their units.
+        values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
+        findings: risks of the linear model and of what was asked of it.
+    """
+
+    omega: Array = field(repr=False)
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    input_units: tuple[str, ...] = field(repr=False)
+    output_units: tuple[str, ...] = field(repr=False)
+    values: Complex = field(repr=False)
+    findings: Iterable[Risk] = field(default=(), repr=False)
+
+    @property
+    def frequency(self) -> Array:
+        """(k,) Hz."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def magnitude(self) -> Array:
+        """(k, outputs, inputs) in units of the output a unit of the input."""
+        return np.abs(self.values)
+
+    @property
+    def phase(self) -> Array:
+        """(k, outputs, inputs) rad in (-pi, pi], negative where the output is behind."""
+        return np.angle(self.values)
+
+    def plot(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`, Bode's: magnitude and phase of every output under every
+        input; written to `path` where it is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .plots.bode_and_locus import bode
+
+        units = [_ratio(y, u) for y in self.output_units for u in self.input_units]
+        values, labels = self._curves()
+        if len(set(units)) > 1:
+            labels = [f"{label}, {unit}" for label, unit in zip(labels, units, strict=True)]
+        unit = units[0] if len(set(units)) == 1 else "units of the curves"
+        return bode(self.frequency, values, labels, unit, path)
+
+    def nyquist(self, path: str | Path | None = None) -> Any:
+        """`matplotlib.figure.Figure`, Nyquist's: the same in the complex plane."""
+        from .plots.bode_and_locus import nyquist
+
+        return nyquist(*self._curves(), path)
+
+    def _curves(self) -> tuple[Complex, list[str]]:
+        """(k, curves) and what each is."""
+        labels = [f"{y} / {u}" for y in self.outputs for u in self.inputs]
+        return self.values.reshape(len(self.omega), -1), labels
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, for JSON; complex numbers in two parts."""
+        return {
+            "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
+            "inputs": list(self.inputs), "outputs": list(self.outputs),
+            "input_units": list(self.input_units), "output_units": list(self.output_units),
+            "real": self.values.real.tolist(), "imag": self.values.imag.tolist(),
+            **self.assessment(),
+        }  # fmt: skip
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        along = ("omega", "output", "input")
+        arrays: dict[str, Any] = {
+            "real": (along, self.values.real), "imag": (along, self.values.imag),
+            "magnitude": (along, self.magnitude), "phase": (along, self.phase, {"units": "rad"}),
+        }  # fmt: skip
+        coords: dict[str, Any] = {
+            "omega": ("omega", self.omega, {"units": "rad/s"}),
+            "output": list(self.outputs), "input": list(self.inputs),
+        }  # fmt: skip
+        return file_formats.xarray().Dataset(arrays, coords)
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each frequency."""
+        curves, labels = self._curves()
+        parts = [f"{label} {part}" for label in labels for part in ("magnitude", "phase [rad]")]
+        yield "omega [rad/s]", "frequency [Hz]", *parts
+        for omega, row in zip(self.omega.tolist(), curves, strict=True):
+            numbers = [x for value in row for x in (abs(value), np.angle(value))]
+            yield tuple(repr(float(x)) for x in (omega, omega / (2 * np.pi), *numbers))
+
+    def save(self, path: str | Path) -> Path:
+        """All of it: .nc (extra io) or .csv, a row for each frequency.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return file_formats.save(path, self.to_dataset, self._rows())
+
+
+def frequency_response(
+    linear: LinearEquations,
+    omega: ArrayLike,
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+    structural: Losses = 0.0,
+    modal: Ratios = 0.0,
+    exact: Chosen = False,
+) -> FrequencyResponse:
+    """See `Linear.frequency_response`."""
+    frequencies = angular_frequencies(omega)
+    beams = None
+    if exact is not False:
+        refuse_turning(linear)
+        refuse_ratios(modal)
+        beams = exact_beams(linear, exact, structural)
+        refuse_inner(beams, [*(inputs or ()), *read_by(linear, outputs)])
+        linear = beams.linear
+        if outputs is None and not linear.model.scene.output:
+            outputs = [name for name in linear.coordinates if not beams.named(name)]
+            if not outputs:
+                raise SceneError(
+                    "exact: all coordinates are shapes of beams; name outputs, such as "
+                    f'"{beams.names[0]}.tip.y"'
+                )
+    pushes = chosen_pushes(linear, inputs)
+    if beams is not None:
+        refuse_distributed(beams, pushes)
+    refuse_drives(pushes, beams is not None or is_requested(structural))
+    shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
+    refuse_unsteady(linear, pushes, shown)
+    values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
+    exact_names = () if beams is None else beams.names
+
+    def find_risks() -> Iterator[Risk]:
+        yield from find_response_risks(linear, pushes, outputs is not None)
+        yield from find_time_risks(linear, pushes, shown)
+        yield from response_range_risks(linear.model, frequencies, exact_names)
+
+    return FrequencyResponse(
+        frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
+        tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+        DeferredRisks(find_risks),
+    )  # fmt: skip
+
+
+def _ratio(output: str, pushed: str) -> str:
+    """Unit of one over the other."""
+    return f"{output}/({pushed})" if "*" in pushed else f"{output}/{pushed}"
+
+
+def angular_frequencies(omega: ArrayLike) -> Array:
+    """(k,) rad/s.  SceneError for what no angular frequencies are."""
+    try:
+        found = np.array(omega, dtype=np.float64).reshape(-1)
+    except (TypeError, ValueError):
+        raise SceneError(f"omega = {omega!r}: expected angular frequencies in rad/s") from None
+    if not found.size:
+        raise SceneError("omega is empty: give angular frequencies in rad/s")
+    wrong = found[~((found > 0) & (found < _FASTEST))]
+    if wrong.size:
+        raise SceneError(
+            f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 and below "
+            f"{_FASTEST:g} in rad/s (of Hz 2 pi times as many)"
+        )
+    return found
+
+
+def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
+    """Those that are named, or those of the model, or its disturbances.  SceneError for none."""
+    if inputs is not None:
+        return [channel(linear.model, name) for name in some_names("inputs", inputs)]
+    pushes = linear.controls or linear.others
+    if not pushes:
+        raise SceneError("frequency response: the model has no inputs; name some")
+    return pushes
+
+
+def _efforts(linear: LinearEquations, pushes: Sequence[Channel]) -> Array:
+    """(n, pushes): what a unit of each does; what the model keeps is not made again."""
+    if pushes is linear.controls:
+        return linear.V
+    if pushes is linear.others:
+        return linear.W
+    return linear.pushed(pushes)
+
+
+class _Sweep:
+    """The response of some outputs to some pushes, s by s."""
+
+    def __init__(
+        self, linear: LinearEquations, pushes: Sequence[Channel], outputs: Sequence[LinearQuantity],
+        structural: Losses, modal: Ratios, beams: ExactBeams | None,
+    ) -> None:  # fmt: skip
+        engine, free = linear.tree, list(linear.free)
+        refuse_in_motion(linear, structural, modal)
+        lossy = stiffer(linear, structural) if is_requested(structural) else None
+        self.modal = modal_damping(linear, modal) if is_requested(modal) else None
+        self.engine, self.response = engine, _response(linear, lossy, beams)
+        efforts = np.zeros((len(pushes), engine.nu))
+        efforts[:, free] = _efforts(linear, pushes).T
+        self.pushed = HarmonicLoads.of(linear, pushes, efforts)
+        self.columns, self.count = self.pushed.columns, len(self.pushed.columns)
+        if self.modal is not None:
+            damping = np.zeros((self.modal.columns.shape[1], engine.nu))
+            damping[:, free] = self.modal.columns.T
+            self.columns = np.concatenate([self.columns, damping])
+        self.free, rows = free, rows_of(linear, outputs, pushes)
+        self.sizes = speed_scales(linear.model)
+        self.rows = {order: wide[:, free] for order, wide in rows.orders.items()}
+        self.carried = {order: self.pushed.carried(wide) for order, wide in rows.orders.items()}
+        self.through = rows.through
+
+    def values(self, omega: Array) -> Complex:
+        """(k, outputs, inputs) at angular frequencies (k,)."""
+        batch = max(1, _BATCH // max(1, self.columns.size))
+        parts = [self._batch(omega[k : k + batch]) for k in range(0, len(omega), batch)]
+        return np.concatenate(parts)
+
+    def _batch(self, omega: Array) -> Complex:
+        values, growth, grown, _ = self._at(np.asarray(1j * omega, dtype=np.complex128))
+        for k in np.flatnonzero(~(growth < _GROWN)):
+            values[k] = self._around(float(omega[k]), values[k], growth[k], int(grown[k]))
+        return values
+
+    def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
+        """Values (k, outputs, inputs), growth and grown bodies (k,) of the elimination, and the
+        amplitudes (k, columns, n)."""
+        x, growth, grown = self.response.amplitudes(s, self.columns)
+        moved = x[:, : self.count, self.free]
+        if self.modal is not None:
+            moved = self.modal.damp(s, moved, x[:, self.count :, self.free])
+        found = np.zeros((len(s), *self.through.shape), dtype=np.complex128)
+        found += self.through
+        for order, rows in self.rows.items():
+            answers = rows @ moved.swapaxes(1, 2)
+            found += s[:, None, None] ** order * self.pushed.summed(s, answers)
+            for j, (power, column) in self.carried[order].items():
+                found[:, :, j] += s[:, None] ** (order + power) * column
+        growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
+        return found, growth, grown, moved
+
+    def _around(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
+        """The response where the elimination lost digits: what is known best of it and its means
+        over circles."""
+        best, unknown = straight, _ROUNDING * growth
+        turns = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
+        for part in _CIRCLES:
+            s = np.asarray(omega * (1j + part * turns), np.complex128)
+            values, growths, _, moved = self._at(s)
+            lost = max(
+                _pole_share(values, turns, _NOISE * self._reach(s, moved)),
+                _ROUNDING * float(growths.max()),
+            )
+            if lost < unknown:
+                best, unknown = values.mean(axis=0), lost
+            if unknown < _GOOD:
+                break
+        if not unknown < _LOST:
+            where = f': hinge "{self.engine.hinge_name(body)}"' if body >= 0 else ""
+            raise NumericalFailure(
+                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping"
+                f"{where} and what it carries answer without bound; add damping, or leave this "
+                "frequency out"
+            )
+        return best
+
+    def _reach(self, s: Complex, moved: Complex) -> Array:
+        """(outputs, inputs): bound of the response if every coordinate moved as far, beside its
+        size, as the one that moves most at s (k,)."""
+        sizes = self.sizes[self.free]
+        most = (np.abs(moved) / sizes).max(axis=(0, 2), initial=0.0)
+        size = float(np.abs(s).max())
+        inputs = self.pushed.summed(np.array([size]), most[None, None]).real[0, 0]
+        outputs = [size**order * (np.abs(rows) @ sizes) for order, rows in self.rows.items()]
+        return np.outer(np.sum(outputs, axis=0), inputs)
+
+
+def _response(
+    linear: LinearEquations, lossy: LoopedEngine | None, beams: ExactBeams | None
+) -> HarmonicResponse | Amplitudes:
+    """What solves for amplitudes: of a tree at rest by elimination, else from matrices."""
+    state, loops = linear.state, linear.mechanism
+    if loops is not None or linear.turning is not None or linear.carrying is not None:
+        lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
+        return Amplitudes(linear.free, Matrices(linear.M, linear.C, linear.K), lost)
+    return HarmonicResponse(
+        linear.tree, state.t, state.q, state.u, state.a, stiffer=lossy,
+        exact=None if beams is None else beams.bodies,
+    )  # fmt: skip
+
+
+def _pole_share(values: Complex, turns: Complex, noise: Array) -> float:
+    """Largest part of the responses (k, outputs, inputs) on a circle that belongs to poles within.
+
+    An analytic function has no negative powers of the distance from the centre.  Its size is that
+    on the circle: at the centre it may be zero (an antiresonance).
+    """
+    powers = turns[None] ** np.arange(1, _POLES + 1)[:, None]
+    poles = np.abs(np.einsum("pk,kij->pij", powers, values) / len(turns)).max(axis=0)
+    sizes = np.abs(values).max(axis=0)
+    share = np.divide(poles, sizes, out=np.zeros_like(sizes), where=poles > noise)
+    return float(share.max(initial=0.0))

@@ -1,0 +1,135 @@
+"""Forces that stand still: the same tree under forces that no motion changes.
+
+Beside the whole scene, a tree whose loads and tensions are those of one state, with fixed
+components in inertial axes, lacks what laws and loads do when they are moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.expression.inputs import INPUTS
+
+from ..engine.engine_calls import Probe
+from ..engine.looped_engine import LoopedEngine
+from ..kernels.tape_kernel import TapeKernel
+from ..packing.expression_tapes import constant_kernel
+from ..packing.scene_packing import packed_system
+from ..packing.system import ForceNumbers, LoadNumbers, System
+from ..result.sources.bushings import deflection_of
+from .mck_matrices import State
+
+INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def without_laws(engine: LoopedEngine) -> LoopedEngine:
+    """The same without laws of hinges."""
+    return LoopedEngine(packed_system(replace(engine.packed.system, laws=()), engine.packed))
+
+
+def with_frozen_springs(engine: LoopedEngine, state: State) -> LoopedEngine:
+    """The same with springs that keep their tension and no laws of hinges: their efforts act along
+    the hinges' own speeds, so that standing ones change nothing.
+
+    A bushing or a force element of a user's own type is left out with all that it does.
+    """
+    system = engine.packed.system
+    springs = (force for force in system.forces if force.element == ("force", "spring"))
+    held = tuple(_held(engine, spring, state) for spring in springs)
+    return LoopedEngine(packed_system(replace(system, laws=(), forces=held), engine.packed))
+
+
+def standing(engine: LoopedEngine, state: State) -> LoopedEngine:
+    """The same with loads too that keep the components in inertial axes that they have there."""
+    held = with_frozen_springs(engine, state)
+    system = held.packed.system
+    values = _values(system, state).tolist()
+    loads = tuple(_dead(engine, load, values, state) for load in system.loads)
+    made = replace(system, loads=loads, values=constant_kernel("values", system, values))
+    return LoopedEngine(packed_system(made, engine.packed))
+
+
+def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
+    """The same with every spring between bodies taken apart into two to the ground, each between
+    one of its ends and the place where the other one stands: what is left does not reach from body
+    to body, and acts as before where nothing moves."""
+    system = engine.packed.system
+    first, second = list(system.forces), []
+    for k, force in enumerate(system.forces):
+        if min(body for body, _, _ in force.ends) < 0:
+            continue
+        seen = _seen(engine, [Probe(*end) for end in force.ends], state)
+        still = [(-1, tuple(pose[15:24].tolist()), tuple(pose[0:3].tolist())) for pose in seen]
+        first[k] = replace(force, ends=(force.ends[0], still[1]))
+        second.append(replace(force, ends=(still[0], force.ends[1])))
+    made = replace(system, forces=(*first, *second))
+    return LoopedEngine(packed_system(made, engine.packed))
+
+
+def _values(system: System, state: State) -> Array:
+    """What the expressions of a scene give at a state."""
+    if system.values is None:
+        return np.zeros(0)
+    given = _given(system, state)
+    return TapeKernel(system.values).run(given)[1]["values"][: system.n_values].copy()
+
+
+def _given(system: System, state: State) -> dict[str, Array]:
+    """What expressions of a scene read."""
+    inputs = system.inputs_at(state.t)
+    return {"t": np.array([state.t]), "q": state.q, "u": state.u, INPUTS: inputs}
+
+
+def _dead(
+    engine: LoopedEngine, load: LoadNumbers, values: list[float], state: State
+) -> LoadNumbers:
+    """A load with components in inertial axes; their values join the others."""
+    if load.axes < 0:
+        return load
+    turned = _seen(engine, [Probe(load.axes, load.axes_own, (0.0, 0.0, 0.0))], state)
+    rotation = turned[0, 15:24].reshape(3, 3)
+    places = []
+    for entries in (load.force, load.moment):
+        components = [0.0 if place < 0 else values[place] for place in entries]
+        places.append(tuple(range(len(values), len(values) + 3)))
+        values += (rotation @ components).tolist()
+    return replace(load, axes=-1, axes_own=INERTIAL, force=places[0], moment=places[1])
+
+
+def _held(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumbers:
+    """A spring whose tension is that of the state."""
+    length, rate = spring_length(engine, spring, state)
+    stiffness, rest, damping = spring.p
+    effort = -stiffness * (length - rest) - damping * rate
+    if spring.effort is not None:
+        given = _given(engine.packed.system, state)
+        kernel = TapeKernel(spring.effort)
+        effort += float(kernel.run({**given, "length": np.array([length, rate])})[1]["values"][0])
+    constant = constant_kernel("effort", engine.packed.system, [effort])
+    return replace(spring, p=(0.0, 0.0, 0.0), effort=constant)
+
+
+def spring_length(engine: LoopedEngine, spring: ForceNumbers, state: State) -> tuple[float, float]:
+    """Length (m) of a spring at a state, and its rate."""
+    seen = _seen(engine, [Probe(*end) for end in spring.ends], state)
+    apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
+    length = float(np.linalg.norm(apart))
+    return length, float(apart @ moving) / length
+
+
+def bushing_deflection(engine: LoopedEngine, bushing: ForceNumbers, state: State) -> Array:
+    """(6,) deflection of a bushing at a state, in its own axes."""
+    rest, end = _seen(engine, [Probe(*one) for one in bushing.ends], state)
+    return deflection_of((rest[None], end[None]))[0]
+
+
+def _seen(engine: LoopedEngine, probes: list[Probe], state: State) -> Array:
+    """(probes, 24) numbers of `Observation.points` at a state."""
+    found = engine.observe(
+        np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None], probes,
+        parts=("points",),
+    )  # fmt: skip
+    return found.points[0]

@@ -1,0 +1,178 @@
+"""Natural motions of scenes with exact beams, by count: no zero is searched, none is missed.
+
+Below omega lie, of undamped motions (Wittrick and Williams, Q. J. Mech. Appl. Math. 24 (1971)
+263-284),
+
+    J(omega) = sum over exact beams of those with both ends held + negative pivots of the sweep,
+
+and J rises by one at each, by as many as coincide.  Bisection of all of them at once finds where.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.array_validation import Array, Integers, integer
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+
+from ...engine.harmonic_response import HarmonicResponse
+from ..modes import CHANNEL_RISKS
+from .exact_beams import Chosen, ExactBeams, exact_beams
+
+if TYPE_CHECKING:
+    from ..linear_equations import LinearEquations
+
+#: Bounds of a frequency in parts of it, and where a pivot vanishes, how far beside it is counted:
+#: next to a pole of a long beam, whose ends hardly know of each other, further than elsewhere.
+_CLOSE, _BESIDE = 2.0**-51, tuple(2.0**-k for k in range(46, 26, -4))
+#: Frequencies in parts of that of a beam alone: below the first they count as 0, above the second
+#: nothing is looked for.
+_SLOWEST, _FASTEST = 1e-6, 1e12
+#: How near to a frequency its shapes are asked for.
+_NEAR = 1e-9
+#: Numbers of one batch of frequencies.
+_BATCH = 2**20
+#: A stiffness further from symmetric than this, in parts, is not that of a potential.
+_SYMMETRIC = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicStiffnessModes(AssessedAnswer):
+    """The slowest k undamped natural motions, those with exact beams, by rising omega.
+
+    Attributes:
+        omega: (k,) rad/s.
+        coordinates: n names; of an exact beam deflection and slope times length of its far end
+            beside the tangent at the other.
+        shapes: (n, k), the largest entry of each 1.
+        complete: True: none below the last is missing.
+        findings: risks of the linear model.
+    """
+
+    omega: Array
+    coordinates: tuple[str, ...] = field(repr=False)
+    shapes: Array = field(repr=False)
+    complete: bool = True
+    findings: Iterable[Risk] = field(default=(), repr=False)
+
+    def __len__(self) -> int:
+        return len(self.omega)
+
+    @property
+    def frequency(self) -> Array:
+        """(k,) Hz."""
+        return self.omega / (2 * np.pi)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        return {
+            "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
+            "coordinates": list(self.coordinates), "shapes": self.shapes.tolist(),
+            "complete": self.complete, **self.assessment(),
+        }  # fmt: skip
+
+
+def exact_modes(linear: LinearEquations, count: int, chosen: Chosen) -> DynamicStiffnessModes:
+    """See `Linear.exact_modes`."""
+    count = integer("count", count, 1, "a number of motions, 1 or more")
+    beams = exact_beams(linear, chosen, 0.0).undamped()
+    counter = _Counter(beams)
+    omega = counter.bisected(count)
+    others = ("shapes", *CHANNEL_RISKS)
+    shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
+    return DynamicStiffnessModes(
+        omega, beams.linear.coordinates, counter.shapes(omega), findings=shapeless
+    )
+
+
+class _Counter:
+    """J of one model, and shapes."""
+
+    def __init__(self, beams: ExactBeams) -> None:
+        linear = beams.linear
+        engine, state = linear.model.looped, linear.state
+        self.beams, self.free = beams, list(linear.free)
+        self.response = HarmonicResponse(
+            engine, state.t, state.q, state.u, state.a, exact=beams.bodies
+        )  # fmt: skip
+        if self.response.tangent.coupled:
+            raise SceneError(
+                "exact modes: springs between bodies or loads that follow others reach across the "
+                "tree, where motions are not counted; take them out"
+            )
+        if linear.pencil.skew() > _SYMMETRIC:
+            raise SceneError(
+                "exact modes: loads follow the scene, so that its motions are not those of a "
+                "potential and cannot be counted; take them out, or ask for modes of shapes"
+            )
+        self.response.undamped()
+        self.unit = beams.slowest
+        size = sum(beam.size**2 for beam in beams.beams) + engine.nu
+        self.most = max(4, _BATCH // max(1, size))
+
+    def below(self, omega: Array) -> Integers:
+        """J (k,) at omega (k,)."""
+        parts = [omega[k : k + self.most] for k in range(0, len(omega), self.most)]
+        return np.concatenate([self._counted(part) for part in parts])
+
+    def _counted(self, omega: Array) -> Integers:
+        for beside in (*_BESIDE, 0.0):
+            found = self.response.count_negative(-(omega**2))
+            if (found >= 0).all():
+                return found + self.beams.clamped(omega)
+            omega = np.where(found < 0, omega * (1 + beside), omega)
+        raise NumericalFailure(f"exact modes: near {omega[found < 0][0]:.9g} rad/s pivots vanish")
+
+    def bisected(self, count: int) -> Array:
+        """omega (count,) of the slowest."""
+        low = _SLOWEST * self.unit
+        if (self.response.count_negative(np.array([low**2])) > 0).any():
+            raise SceneError(
+                "exact modes: near this state a motion grows; ask about a state that is stable"
+            )
+        high = self.unit
+        while self.below(np.array([high]))[0] < count:
+            high *= 2
+            if high > _FASTEST * self.unit:
+                raise SceneError(
+                    f"count = {count}: the scene has no more than "
+                    f"{self.below(np.array([high]))[0]} natural motions; ask for fewer"
+                )
+        wanted = np.arange(1, count + 1)
+        lower, upper = np.full(count, low), np.full(count, high)
+        still = self.below(np.array([low]))[0]
+        while (upper - lower > _CLOSE * upper).any():
+            middle, which = np.unique((lower + upper) / 2, return_inverse=True)
+            reached = self.below(middle)[which] >= wanted
+            lower, upper = (
+                np.where(reached, lower, middle[which]),
+                np.where(reached, middle[which], upper),
+            )
+        return np.where(wanted <= still, 0.0, (lower + upper) / 2)
+
+    def shapes(self, omega: Array) -> Array:
+        """(n, k): answers next to each frequency; of equal ones as many as there are."""
+        runs = _runs(omega)
+        near = np.maximum(omega[[first for first, _ in runs]], _SLOWEST * self.unit) * (1 - _NEAR)
+        most = max(last - first for first, last in runs)
+        columns = np.zeros((most, self.response.engine.nu))
+        columns[:, self.free] = np.random.default_rng(0).standard_normal((most, len(self.free)))
+        answers, _, _ = self.response.amplitudes(near.astype(np.complex128) * 1j, columns)
+        found = [np.linalg.qr(answer[: last - first, self.free].real.T)[0]
+                 for answer, (first, last) in zip(answers, runs, strict=True)]  # fmt: skip
+        shapes = np.concatenate(found, axis=1)
+        places = np.abs(shapes).argmax(axis=0)
+        return np.asarray(shapes / shapes[places, np.arange(len(omega))])
+
+
+def _runs(omega: Array) -> list[tuple[int, int]]:
+    """From and to of frequencies that are one."""
+    apart = np.diff(omega) > 10 * _NEAR * omega[1:]
+    cuts = [0, *(np.flatnonzero(apart) + 1).tolist(), len(omega)]
+    return list(itertools.pairwise(cuts))

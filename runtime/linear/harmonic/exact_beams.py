@@ -1,0 +1,287 @@
+"""Beams by their dynamic stiffness in place of shapes: the scene that is swept, and theirs.
+
+Such a beam keeps two shapes in each bending plane and one of twist and tension, the displacements
+of its far end, by which it joins what hangs there.  For every s the dynamic stiffness of frame and
+shapes takes the place of mass and stiffness of the body, and the sweep goes on as ever.  The
+solution is that of a straight uniform beam of Euler and Bernoulli that nothing bends or pulls at
+rest; whatever else a beam has is refused by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.array_validation import Array, Integers
+from mstmm.errors import SceneError
+from mstmm.scene import split_reference
+from mstmm.scene.tables.beam_keys import DIRECTIONS
+from mstmm.scene.validators.validation_messages import did_you_mean
+
+from ...engine.harmonic_response import Complex, DynamicStiffnessBodies
+from ...engine.tangent_matrix import TangentMatrix
+from ...flexible.beam.beam_data import BeamData, beam_data
+from ...flexible.beam.boundary_conditions import BeamEnvironment, holding
+from ...flexible.beam.dynamic_stiffness import BENDING, HarmonicBeam, harmonic_beam
+from ...flexible.kernel_inputs import in_frame
+from ...packing.scene_parameters import data_of, made_of
+from ..frozen_loads import standing
+from ..input_channels import GROUND, Channel, channel
+from ..mck_matrices import State
+from ..operating_point.friction import dry_friction
+from .hysteretic_damping import Losses, by_name
+
+if TYPE_CHECKING:
+    from mstmm.scene.tables.beam import Beam
+
+    from ...engine.compiled_scene import CompiledScene
+    from ..linear_equations import LinearEquations
+
+#: Which beams are exact: all of the scene, none, or those of these names.
+Chosen = bool | Sequence[str]
+
+#: Deflections at rest in parts of the length, and stiffness by tension in parts of the elastic one,
+#: that count as none.
+_STRAIGHT = 1e-6
+
+
+@dataclass(frozen=True)
+class ExactBeams:
+    """A linear model whose beams of these names, in the order of `beams`, are exact."""
+
+    linear: LinearEquations
+    names: tuple[str, ...]
+    beams: tuple[HarmonicBeam, ...]
+
+    @property
+    def bodies(self) -> DynamicStiffnessBodies:
+        """What the sweep takes for them."""
+        positions = self.linear.model.packed.positions
+        return DynamicStiffnessBodies(
+            tuple(positions[name] for name in self.names), self._stiffness
+        )
+
+    def _each(self, of: Callable[[HarmonicBeam], Any]) -> list[Any]:
+        """A number of every beam, of equal ones asked once."""
+        distinct = {id(beam): beam for beam in self.beams}
+        found = {key: of(beam) for key, beam in distinct.items()}
+        return [found[id(beam)] for beam in self.beams]
+
+    def _stiffness(self, s: Complex) -> list[Complex]:
+        return self._each(lambda beam: beam.stiffness(s))
+
+    def clamped(self, omega: Array) -> Integers:
+        """(k,) natural motions of all of them below omega, every beam held at both ends."""
+        return np.asarray(sum(self._each(lambda beam: beam.clamped(omega))), dtype=np.int64)
+
+    @property
+    def slowest(self) -> float:
+        """The least of their own frequencies, rad/s."""
+        return min(beam.frequency for beam in self.beams)
+
+    def undamped(self) -> ExactBeams:
+        """The same without any damping of theirs."""
+        return replace(self, beams=tuple(self._each(HarmonicBeam.undamped)))
+
+    def named(self, coordinate: str) -> bool:
+        """Whether a coordinate is a shape of one of them."""
+        return coordinate.partition(".")[0] in self.names
+
+
+def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> ExactBeams:
+    """The model with beams that are exact.
+
+    Raises SceneError for names of no flexible beams and for beams and states that the solution does
+    not hold for.
+    """
+    if linear.mechanism is not None:
+        raise SceneError("exact: a loop is closed; the solution goes along trees alone")
+    if linear.state.u.any():
+        raise SceneError("exact: this state moves; the solution is that of beams at rest")
+    model, names = linear.model, _names(linear.model, chosen)
+    gravity = model.scene.gravity
+    if any(gravity):
+        raise SceneError(
+            f"exact: gravity = {list(gravity)} bends or pulls beams, whose solution is that of "
+            "straight ones without tension; give gravity = [0, 0, 0], or shapes"
+        )
+    around = BeamEnvironment(model.scene)
+    tables = {beam.name: beam for beam in model.scene.beam if beam.name in names}
+    for name in names:
+        data = beam_data(tables[name])
+        held = holding(around, tables[name], data)
+        _refuse(tables[name], data, [held.x, *(end.x for end in held.ends)])
+    found = _with_ends_as_shapes(linear, names)
+    lossy = by_name(found.model, losses)
+    beams = _distinct(found, tables, names, [lossy(name) for name in names])
+    _refuse_bent(found, linear, tables, names)
+    return ExactBeams(found, names, beams)
+
+
+def _names(model: CompiledScene, chosen: Chosen) -> tuple[str, ...]:
+    flexible = [beam.name for beam in model.scene.beam if beam.name in model.layout.modal]
+    if chosen is True:
+        if not flexible:
+            raise SceneError("exact: the scene has no flexible beam")
+        return tuple(flexible)
+    if isinstance(chosen, str) or not isinstance(chosen, Sequence):
+        raise SceneError(f"exact = {chosen!r}: expected True, or a list of names of beams")
+    if not chosen:
+        raise SceneError("exact is empty: leave it out, or name some beams")
+    for name in chosen:
+        if name not in flexible:
+            raise SceneError(
+                f'exact: "{name}": expected a flexible '
+                f"beam{did_you_mean(str(name), sorted(flexible))}"
+            )
+    return tuple(dict.fromkeys(chosen))
+
+
+def _refuse(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
+    """SceneError for what the solution does not have."""
+    inner = [x for x in places if x not in (0.0, data.length)]
+    problem = ""
+    if not data.uniform:
+        problem = "has sections that differ; weld uniform beams into one"
+    elif data.rotary:
+        problem = "has rotary inertia, which the solution leaves out; take it out"
+    elif inner:
+        problem = f"is held or acted on at x = {inner[0]:g} m; weld two beams there"
+    elif any(beam.damping.ratio):
+        problem = (
+            "has damping by ratios of its shapes, which it no longer has; give "
+            f'damping = {{ stiffness = ... }}, or structural = {{"{beam.name}": ...}}'
+        )
+    if problem:
+        raise SceneError(f'exact: beam "{beam.name}" {problem}, or leave its shapes')
+
+
+def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> LinearEquations:
+    """The same model, the shapes of these beams the displacements of their far ends."""
+    model = linear.model
+    data = data_of(model.scene)
+    for beam in data["beam"]:
+        if beam["name"] in names:
+            _reshape(beam, model.flexible[beam["name"]].modes)
+    made = type(model)(made_of(data, model.scene), model.known)
+    q = np.zeros(made.nq)
+    hinges = min((slots.q for slots in model.layout.modal.values()), default=model.nq)
+    q[:hinges] = linear.state.q[:hinges]
+    for name, slots in model.layout.modal.items():
+        if name not in names:
+            q[made.layout.modal[name].q_slice] = linear.state.q[slots.q_slice]
+    still = np.zeros(made.nu)
+    _, a = made.looped.accelerations(
+        linear.state.t, q[None].copy(), still[None].copy(), made.looped.start_memory()[None]
+    )
+    dry = None if linear.dry is None else dry_friction(made, still, linear.dry.amplitudes)
+    return replace(
+        linear, model=made, state=State(linear.state.t, q, still, a[0]), dry=dry,
+        controls=tuple(channel(made, one.name) for one in linear.controls),
+        others=tuple(channel(made, one.name) for one in linear.others),
+    )  # fmt: skip
+
+
+def _reshape(beam: dict[str, Any], modes: Sequence[str]) -> None:
+    directions = dict.fromkeys(name.rstrip("0123456789") for name in modes)
+    for key in ("shapes", "initial"):
+        beam.pop(key, None)
+    beam |= {
+        "basis": "static+fixed-interface", "frame": "tangent", "quadrature": False,
+        "modes": {d: 2 if d in BENDING else 1 for d in directions},
+    }  # fmt: skip
+
+
+def _distinct(
+    linear: LinearEquations, tables: dict[str, Beam], names: Sequence[str], losses: Sequence[float]
+) -> tuple[HarmonicBeam, ...]:
+    """The beams, equal ones being one."""
+    packed, known = linear.model.packed, dict[tuple[object, ...], HarmonicBeam]()
+    found = []
+    for name, loss in zip(names, losses, strict=True):
+        place = packed.placements[name]
+        turn = np.array(place.rotation)
+        body = in_frame(packed.flexible[name], turn, np.array(place.origin))
+        beam = harmonic_beam(
+            beam_data(tables[name]), body, turn.T, tables[name].damping.stiffness, loss
+        )
+        found.append(known.setdefault(beam.told, beam))
+    return tuple(found)
+
+
+# --- rest -----------------------------------------------------------------------------------------
+
+
+def _refuse_bent(
+    linear: LinearEquations, given: LinearEquations, tables: dict[str, Beam], names: Sequence[str]
+) -> None:
+    """SceneError for beams that something bends or pulls at rest."""
+    model, state = linear.model, linear.state
+    still = np.zeros(model.nu)
+    memory = model.looped.start_memory()
+    missing = model.looped.inverse_dynamics(state.t, state.q, still, still, memory)
+    x = still.copy()
+    for name in names:
+        slots = model.layout.modal[name].u_slice
+        x[slots] = np.random.default_rng(0).uniform(0.5, 1.0, slots.stop - slots.start)
+    pulled = _stiffness(linear, x)
+    for name in names:
+        slots, stiffness = model.layout.modal[name].u_slice, model.flexible[name].K
+        bent = np.abs(np.linalg.solve(stiffness, missing[slots])).max()
+        start = np.abs(given.state.q[given.model.layout.modal[name].q_slice]).max(initial=0)
+        if max(bent, start) > _STRAIGHT * tables[name].length:
+            raise SceneError(
+                f'exact: beam "{name}" is bent at rest; the solution is that of a straight one; '
+                "take away what bends it, or leave its shapes"
+            )
+        elastic = stiffness @ x[slots]
+        if np.abs(pulled[slots] - elastic).max() > _STRAIGHT * np.abs(elastic).max():
+            raise SceneError(
+                f'exact: beam "{name}" is pulled or pressed at rest, which makes it stiffer or '
+                "softer; take the load away, or leave its shapes"
+            )
+
+
+def _stiffness(linear: LinearEquations, x: Array) -> Array:
+    """K x of what stands: shapes and loads that are there, without laws and springs."""
+    state = linear.state
+    tangent = TangentMatrix(standing(linear.model.looped, state))
+    moved = tangent.rates(state.q, x)
+    tangent.residual(state.t, state.q, state.u, state.a)
+    still = np.zeros(len(x))
+    return tangent.slope(0.0, moved, still, still)
+
+
+def refuse_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
+    """SceneError for pushes along exact beams: their stiffness is that between loads at ends."""
+    scene = beams.linear.model.scene
+    loaded = any(
+        load.force_per_length is not None and split_reference(load.on)[0] in beams.names
+        for load in scene.load
+    )
+    for push in pushes:
+        if push.name in GROUND or (push.input >= 0 and loaded):
+            raise SceneError(
+                f'"{push.name}" pushes all along beam "{beams.names[0]}", and exact beams know '
+                "pushes at ends alone; name other inputs, such as forces on ends, or take shapes"
+            )
+
+
+def refuse_inner(beams: ExactBeams, names: Sequence[str]) -> None:
+    """SceneError for what exact beams do not have, among names of inputs and outputs: shapes, and
+    ends between root and tip."""
+    tables = {beam.name: beam for beam in beams.linear.model.scene.beam}
+    for signal in names:
+        name, rest = split_reference(signal)
+        if name not in beams.names:
+            continue
+        beam, end = tables[name], rest.partition(".")[0]
+        if end in beam.ends and beam.end_x(end) not in (0.0, beam.length):
+            raise SceneError(
+                f'"{signal}": exact beams are asked at their root and tip; weld two beams there'
+            )
+        if end not in beam.ends and end.rstrip("0123456789_rate") in DIRECTIONS:
+            raise SceneError(f'"{signal}": beam "{name}" is exact and has no shapes; ask an end')

@@ -1,0 +1,47 @@
+"""Amplitudes under harmonic pushes from matrices: of mechanisms, and of states that turn balls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+
+from ..mck_matrices import Matrices
+
+Complex = NDArray[np.complex128]
+
+
+class Amplitudes:
+    """Z(s) x = r, as `Response` solves it of a tree at rest: x and r stand in `places` among the
+    speeds."""
+
+    def __init__(self, places: Sequence[int], whole: Matrices, lossy: Matrices | None) -> None:
+        self._places, self._whole = list(places), whole
+        self._lost = 0.0 if lossy is None else 1j * (lossy.K - whole.K)
+
+    def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
+        """x (k, n, nu) at every s (k,) of n right-hand sides (n, nu), the condition (k,) of Z, and
+        no body."""
+        x = np.zeros((len(s), *columns.shape), dtype=np.complex128)
+        growth, whole = np.zeros(len(s)), self._whole
+        for k, at in enumerate(s):
+            parts = at**2 * whole.M, at * whole.C, whole.K + self._lost
+            z = np.asarray(sum(parts))
+            growth[k] = _condition(z, np.asarray(sum(map(np.abs, parts))))
+            if np.isfinite(growth[k]):
+                x[k][:, self._places] = np.linalg.solve(z, columns[:, self._places].T).T
+        return x, growth, np.full(len(s), -1, dtype=np.int32)
+
+
+def _condition(z: Complex, cancelling: Array) -> float:
+    """Of a symmetric matrix beside the sizes of what cancels in it, infinite where it is
+    singular."""
+    scale = np.sqrt(cancelling.max(axis=1, initial=0.0))
+    if not len(z) or not scale.all():
+        return float(np.inf) if len(z) else 1.0
+    size = float(np.linalg.norm(cancelling / np.outer(scale, scale), 2))
+    least = float(np.linalg.svd(z / np.outer(scale, scale), compute_uv=False).min())
+    return size / least if least else float(np.inf)

@@ -1,0 +1,160 @@
+"""Hysteretic damping: what is elastic loses, at every frequency, the same part of its energy.
+
+A loss factor eta makes the stiffness k of an element k (1 + i eta) under harmonic motion (Crandall,
+J. Sound Vib. 11 (1970) 3-18).  What the losses add is i (K' - K) of two scenes, whose elements lose
+nothing: the scene itself, and one that is stiffer by eta k and carries the same static loads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import finite_float
+from mstmm.errors import SceneError
+from mstmm.scene.validators.validation_messages import did_you_mean
+
+from ...engine.looped_engine import LoopedEngine
+from ...packing.scene_packing import packed_system
+from ...packing.system import Arrays, BodyNumbers, BodyRun, ForceNumbers, LawNumbers
+from ..frozen_loads import bushing_deflection, spring_length
+from ..mck_matrices import State
+from ..operating_point.friction import changed_laws
+
+if TYPE_CHECKING:
+    from ...engine.compiled_scene import CompiledScene
+    from ..linear_equations import LinearEquations
+
+#: Loss factors of all that is elastic, or by the names of hinges, chains, flexible bodies, springs.
+Losses = float | Mapping[str, float]
+
+#: Rows of the matrices of bushings and bearings.
+_SIZES = {"bushing6": 6, "bearing6": 6, "bearing3": 3}
+#: Places of stiffnesses among the numbers of a law; a rotation's are the three behind shifts.
+_STIFF = {
+    "linear": (0,), "full": (0, 9), "rotation": (0, 1, 2), "six": (0, 1, 2, 9, 10, 11),
+}  # fmt: skip
+
+
+def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
+    """The scene with stiffness larger by what it loses, its elements as they stand at the state.
+
+    Efforts that expressions give, and elements of a user's own type, lose nothing.
+
+    Raises SceneError for a name that has no stiffness and for a loss factor that is below 0.
+    """
+    model, engine, state = linear.model, linear.tree, linear.state
+    system, lossy = engine.packed.system, by_name(model, losses)
+    bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
+
+    def stiff(law: LawNumbers, body: int) -> LawNumbers:
+        return _stiffer_law(law, lossy(engine.hinge_name(body)))
+
+    laws = tuple(law for run in system.laws for law in changed_laws(run, stiff))
+    forces = tuple(
+        _stiffer_force(engine, force, state, lossy(one.name))
+        for force, one in zip(system.forces, engine.packed.scene.forces, strict=True)
+    )
+    made = replace(system, bodies=bodies, laws=laws, forces=forces)
+    return LoopedEngine(packed_system(made, engine.packed))
+
+
+def by_name(model: CompiledScene, losses: Losses) -> Callable[[str], float]:
+    """The loss factor of an element by its name; members of a chain are their chain's."""
+    if not isinstance(losses, Mapping):
+        factor = _factor("structural", losses)
+        return lambda name: factor
+    known = set(_elastic(model))
+    for name in losses:
+        if name not in known:
+            raise SceneError(
+                f'structural: "{name}": expected a hinge with a law, a chain, a flexible body, a '
+                f"spring or a bushing{did_you_mean(str(name), sorted(known))}"
+            )
+    factors = {name: _factor(f'structural["{name}"]', value) for name, value in losses.items()}
+    return lambda name: factors.get(name, factors.get(name.partition("[")[0], 0.0))
+
+
+def _factor(what: str, value: float) -> float:
+    factor = finite_float(what, value, "a loss factor, such as 0.02")
+    if factor < 0:
+        raise SceneError(f"{what} = {factor:g}: expected a loss factor of 0 or more, such as 0.02")
+    return factor
+
+
+def _elastic(model: CompiledScene) -> Iterator[str]:
+    """Names that may lose energy."""
+    packed = model.packed
+    yield from model.layout.modal
+    yield from (one.name for one in packed.scene.forces)
+    for run in packed.system.laws:
+        for _, body, _, _ in run.each():
+            name = model.looped.hinge_name(body)
+            yield name
+            yield name.partition("[")[0]
+
+
+def _stiffer_shapes(model: CompiledScene, run: BodyRun, lossy: Callable[[str], float]) -> BodyRun:
+    names = {slots.q: name for name, slots in model.layout.modal.items()}
+
+    def one(body: BodyNumbers) -> BodyNumbers:
+        if body.modal is None:
+            return body
+        matrices = dict(body.modal.matrices.named)
+        matrices["stiffness"] = matrices["stiffness"] * (1 + lossy(names[body.modal.q]))
+        return replace(body, modal=replace(body.modal, matrices=Arrays(matrices)))
+
+    if all(body.modal is None for body in run.alike):
+        return run
+    return replace(run, alike=tuple(map(one, run.alike)))
+
+
+def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:
+    p = list(law.p)
+    for place in _STIFF[law.kernel]:
+        p[place] *= 1 + factor
+    return replace(law, p=tuple(p))
+
+
+def _stiffer_force(
+    engine: LoopedEngine, force: ForceNumbers, state: State, factor: float
+) -> ForceNumbers:
+    if force.element[1] in _SIZES and force.element[0] == "force" and factor:
+        return _stiffer_bushing(engine, force, state, factor)
+    return _stiffer_spring(engine, force, state, factor)
+
+
+def _stiffer_bushing(
+    engine: LoopedEngine, force: ForceNumbers, state: State, factor: float
+) -> ForceNumbers:
+    """A stiffer bushing whose load at the state is the same, by more preload."""
+    n = _SIZES[force.element[1]]
+    pairs, above = n * (n + 1) // 2, n * (n - 1) // 2
+    ends = np.cumsum([pairs, pairs, n, above])
+    stiffness, damping, preload, circulatory, gyroscopic = np.split(np.array(force.p), ends)
+    matrix = np.zeros((n, n))
+    matrix[np.triu_indices(n)] = stiffness
+    matrix += np.triu(matrix, 1).T
+    if len(circulatory):
+        skew = np.zeros((n, n))
+        skew[np.triu_indices(n, 1)] = circulatory
+        matrix += skew - skew.T
+    more = factor * matrix @ bushing_deflection(engine, force, state)[:n]
+    stiffer_ones, turned = ((1 + factor) * part for part in (stiffness, circulatory))
+    p = np.concatenate([stiffer_ones, damping, preload + more, turned, gyroscopic])
+    return replace(force, p=tuple(p.tolist()))
+
+
+def _stiffer_spring(
+    engine: LoopedEngine, force: ForceNumbers, state: State, factor: float
+) -> ForceNumbers:
+    """A stiffer spring whose tension at the state is the same."""
+    if force.element != ("force", "spring") or not factor * force.p[0]:
+        return force
+    stiffness, rest, damping = force.p
+    length, _ = spring_length(engine, force, state)
+    more = stiffness * (1 + factor)
+    return replace(force, p=(more, length - (length - rest) / (1 + factor), damping))

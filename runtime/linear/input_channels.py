@@ -1,0 +1,268 @@
+"""Where a linear model is pushed: efforts, forces and moments at ends, accelerations of the ground,
+inputs of the scene.
+
+The residual is linear in whatever acts, so that a column is the difference of two residuals of the
+tree at rest under nothing else, without error.  By duality the column of a force at a point along n
+is also how far the point goes along n with each coordinate.
+
+What an input changes is the derivative of the residual by it: by time, where the input goes by time
+at a unit's rate, less that where it stands still.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.ir.hinge_properties import effort_unit
+from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
+from mstmm.scene.tables.external.inputs import Input
+from mstmm.scene.validators.validation_messages import did_you_mean
+
+from ..discontinuities.active_expressions import active_expressions
+from ..engine.body_references import BodyReferences
+from ..engine.looped_engine import LoopedEngine
+from ..engine.observation_columns import acceleration_name, effort_names
+from ..engine.tangent_matrix import TangentMatrix
+from ..packing.expression_tapes import constant_kernel
+from ..packing.scene_packing import packed_system
+from ..packing.system import LoadNumbers
+from .drive_inputs import Moves, accelerations, columns_of, followers, motions
+from .frozen_loads import INERTIAL
+from .mck_matrices import State
+
+if TYPE_CHECKING:
+    from ..engine.compiled_scene import CompiledScene
+
+_AXES = "xyz"
+#: What pushes at an end, by the letter of its short name.
+_KINDS = {"f": ("force", "N"), "m": ("moment", "N*m")}
+GROUND = tuple(f"ground.acceleration.{axis}" for axis in _AXES)
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One push: its name, unit, and which place pushes: `speed`, or `end` with `kind` and `axis`,
+    or the place of an `input` or of a `spring` among all; an acceleration of the ground where there
+    is none.  Where drives move, `moves` says which, and `drive` how often they are differentiated.
+    """
+
+    name: str
+    unit: str
+    speed: int = -1
+    end: str = ""
+    kind: str = ""
+    axis: int = 0
+    input: int = -1
+    spring: int = -1
+    drive: int = -1
+    moves: Moves = ()
+
+
+def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
+    """A list of names; SceneError for anything else."""
+    if isinstance(names, str) or not isinstance(names, Iterable):
+        raise SceneError(f'{what} = {names!r}: expected a list of names, such as ["{names}"]')
+    if not all(isinstance(name, str) for name in names):
+        raise SceneError(f"{what} = {names!r}: expected a list of names")
+    return names
+
+
+def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
+    """The same with at least one."""
+    if not names_of(what, names):
+        raise SceneError(f"{what} is empty: leave it out, or name some")
+    return names
+
+
+def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tuple[Channel, ...]:
+    """The pushes of a list of names, as matrices take them: of drives the accelerations."""
+    found = tuple(channel(model, name) for name in names_of(what, names))
+    for one in found:
+        if 0 <= one.drive < 2:
+            instead = ", ".join(f'"{x}"' for x in accelerations(model, one.moves))
+            raise SceneError(
+                f'"{one.name}": matrices take the acceleration of a drive, {instead}, for an '
+                "input, and make the rest states; frequency_response takes this one too"
+            )
+    return found
+
+
+def inputs_of(model: CompiledScene) -> list[str]:
+    """Inputs of the scene, but those that drive: they are motions and no pushes."""
+    if not model.scene.input:
+        return []
+    driving = {name for one in active_expressions(model.scene) if one.drive for name in one.inputs}
+    return [one.name for one in model.scene.input if one.name not in driving]
+
+
+def channel(model: CompiledScene, name: str) -> Channel:
+    """The push of a name: "shoulder.effort" (of hinges with several speeds "ball.effort_wx"),
+    "boom.tip.force.x" or short "boom.tip.fx", "boom.tip.moment.z" or "boom.tip.mz" (inertial axes),
+    "ground.acceleration.y", or an input of the scene.
+
+    Raises SceneError for a name that is none of these, and for an input that drives.
+    """
+    owner, _, last = name.rpartition(".")
+    given = next((one for one in model.scene.input if one.name == name), None)
+    if given is not None:
+        if any(one.drive and name in one.inputs for one in active_expressions(model.scene)):
+            return _following(model, given)
+        return Channel(name, given.unit, input=model.layout.inputs[name])
+    if name in GROUND:
+        return Channel(name, "m/s2", axis=_AXES.index(last))
+    driven = motions(model)
+    if name in driven:
+        motion = driven[name]
+        return Channel(name, motion.unit, drive=motion.order, moves=((motion.speed, 1.0),))
+    ends = BodyReferences(model.scene.skeleton)
+    if last.startswith("effort") and owner in model.layout.hinges:
+        return _effort(model, name, owner, last)
+    springs = [one.name for one in model.scene.spring]
+    if last == "effort" and owner in springs:
+        return Channel(name, "N", spring=springs.index(owner))
+    for letter, (kind, unit) in _KINDS.items():
+        for axis, component in enumerate(_AXES):
+            end = owner.removesuffix(f".{kind}")
+            long = end != owner and last == component
+            if (long or last == letter + component) and end in ends:
+                own = ends.canonical(end) or end
+                return Channel(f"{end}.{kind}.{component}", unit, end=own, kind=kind, axis=axis)
+    given_names = [one.name for one in model.scene.input]
+    known = [
+        *given_names,
+        *driven,
+        *(f"{spring}.effort" for spring in springs),
+        *_efforts(model),
+        *(f"{end}.force.{axis}" for end in ends for axis in _AXES),
+        *GROUND,
+    ]
+    raise SceneError(
+        f'"{name}": expected an effort of a hinge or spring such as "shoulder.effort", a force or '
+        'moment at an end such as "boom.tip.force.x", an acceleration of the ground such as '
+        '"ground.acceleration.x", a motion of a drive, or an input of the scene'
+        f"{did_you_mean(name, known)}"
+    )
+
+
+def _following(model: CompiledScene, given: Input) -> Channel:
+    """An input that drives follow: the motion of these."""
+    pushing = [
+        x.what for x in active_expressions(model.scene) if given.name in x.inputs and not x.drive
+    ]
+    if pushing:
+        raise SceneError(
+            f'"{given.name}": drives follow this input, and the {pushing[0]} reads it besides; '
+            "give each an input of its own"
+        )
+    return Channel(given.name, given.unit, drive=0, moves=followers(model, given.name, 0.0))
+
+
+def _effort(model: CompiledScene, name: str, hinge: str, last: str) -> Channel:
+    slots = model.layout.hinges[hinge]
+    names = effort_names(slots.u_names)
+    if last not in names:
+        raise SceneError(f'"{name}": hinge "{hinge}" has {", ".join(names) or "no speeds"}')
+    k = names.index(last)
+    if slots.u + k not in model.free_speeds:
+        raise SceneError(
+            f'"{name}": hinge "{hinge}" is driven there, so that an effort moves nothing; push '
+            "somewhere else, or take the motion of the drive for an input, such as "
+            f'"{hinge}.{acceleration_name(slots.u_names[k])}"'
+        )
+    return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)
+
+
+def _efforts(model: CompiledScene) -> list[str]:
+    hinges = model.layout.hinges
+    return [f"{name}.{effort}" for name in hinges for effort in effort_names(hinges[name].u_names)]
+
+
+def columns(
+    engine: LoopedEngine, state: State, channels: Sequence[Channel], free: list[int]
+) -> Array:
+    """(free, channels): efforts in the free speeds of a unit of each push."""
+    if not channels:
+        return np.zeros((len(free), 0))
+    still, memory = np.zeros(engine.nu), engine.start_memory()
+
+    def beyond(of: LoopedEngine) -> Array:
+        """Efforts that it needs at rest beyond those of the same tree under nothing."""
+        bare, loaded = (
+            each.inverse_dynamics(state.t, state.q, still, still, memory)
+            for each in (engine.inertia_alone, of)
+        )
+        return np.asarray(loaded - bare)
+
+    found = []
+    for one in channels:
+        if one.input >= 0:
+            found.append(
+                _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
+            )
+        elif one.drive >= 0:
+            found.append(-columns_of(engine, state, one.moves).inertia)
+        elif one.speed >= 0:
+            found.append(np.eye(engine.nu)[one.speed])
+        elif one.spring >= 0:
+            found.append(-beyond(_stretched(engine, one.spring)))
+        elif one.end:
+            found.append(-beyond(_under(engine, one)))
+        else:
+            found.append(beyond(engine.pulled[one.axis]))
+    return np.array(found).T[free]
+
+
+def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
+    """How the residual (nu,) changes with time where all inputs stand still at their values but
+    one, which goes at this rate."""
+    system = engine.packed.system
+    inputs = [
+        PiecewisePolynomial(
+            (), ((state.t, one.value(state.t), rate if k == place else 0.0, 0.0, 0.0),)
+        )
+        for k, one in enumerate(system.inputs)
+    ]
+    still = replace(system.held, places=(-1,) * len(inputs))
+    going = replace(system, inputs=tuple(inputs), held=still)
+    tangent = TangentMatrix(LoopedEngine(packed_system(going, engine.packed)))
+    tangent.residual(state.t, state.q, state.u, state.a)
+    nothing = np.zeros(engine.nu)
+    return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)
+
+
+def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
+    """The tree under a unit of one push at an end alone."""
+    packed = engine.packed
+    body, _, offset = packed.end(push.end)
+    system = packed.system.awake(body)  # nothing else may hang or act on this end
+    unit = np.eye(3)[push.axis].tolist()
+    nothing, own = (-1, -1, -1), (0, 1, 2)
+    force = push.kind == "force"
+    load = LoadNumbers(
+        body, -1, INERTIAL, offset, own if force else nothing, nothing if force else own
+    )
+    system = replace(
+        system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(), loads=(load,),
+        values=constant_kernel("values", system, unit), drives=None, driven=(), moving={},
+    )  # fmt: skip
+    return LoopedEngine(packed_system(system, packed))
+
+
+def _stretched(engine: LoopedEngine, number: int) -> LoopedEngine:
+    """The tree under a unit effort of one spring alone."""
+    packed, system = engine.packed, engine.packed.system
+    constant = constant_kernel("effort", system, [1.0])
+    spring = replace(
+        system.forces[number], element=("force", "spring"), p=(0.0, 0.0, 0.0), effort=constant
+    )
+    system = replace(
+        system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(spring,), loads=(), values=None,
+        drives=None, driven=(), moving={},
+    )  # fmt: skip
+    return LoopedEngine(packed_system(system, packed))

@@ -1,0 +1,324 @@
+"""The linear equations of a scene about a state: matrices in parts, and pushes, with names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.argument_validation import require_texts
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.risk import AssessedAnswer
+
+from ..packing.coordinate_layout import refuse_dense
+from ..run.scene_system import SceneSystem
+from .drive_inputs import Columns, Moves, columns_of, coordinate
+from .frozen_loads import standing, with_frozen_springs, without_laws
+from .input_channels import Channel, columns
+from .loops.constrained_linearisation import ConstrainedLinearisation
+from .matrix_operators import Pencil
+from .mck_matrices import Matrices, State, matrices
+from .operating_point.friction import DryFriction
+from .rotors.carrying import Carrying
+
+if TYPE_CHECKING:
+    from ..engine.compiled_linearisation import CompiledState
+    from ..engine.compiled_scene import CompiledScene
+    from ..engine.looped_engine import LoopedEngine
+    from .symbolic_matrices import SymbolicLinearModel
+
+
+@dataclass(frozen=True, eq=False)
+class LinearEquations(AssessedAnswer):
+    """M x'' + C x' + K x = V v + W w of motions x near a state of a scene, SI units.
+
+    x (n,) are tangent increments of the coordinates that nobody imposes: dq = N(q) x where
+    qdot = N(q) u, which of most hinges and of shapes are the coordinates themselves and of balls
+    rotation vectors in outboard axes.  Rows are N, N*m; v and w are efforts, forces and moments
+    beyond those of the state, accelerations of the ground, and accelerations d'' of drives; with
+    these M x'' + C x' + K x + C_driven d' + K_driven d = V v + W w.
+
+    Attributes:
+        model: whose motion it is.
+        state: t (s), q (nq,), u (nu,) and a (nu,), the accelerations there.
+        controls, others: where v and w push.
+        turning: (n, n) G of x' = G x + du, how increments of coordinates that are no integrals of
+            speeds go along with the motion; None where they do not.
+        about: the state by code compiled for the scene, where there is such code.
+        mechanism: how closed loops let the scene move there: x are independent motions then; None
+            for a tree.
+        dry: friction of hinges that rest at the state, which is left out or counts as viscous
+            damping; None where all of it is as the laws have it.
+        carrying: the transformation of increments of a spinning rotor to the fixed frame; None
+            where x are those of the coordinates themselves.
+        at_speeds: gives the equations at q with speeds (nu,), where the state was looked for at
+            rest because none was given; else None.
+    """
+
+    model: CompiledScene
+    state: State
+    controls: tuple[Channel, ...] = ()
+    others: tuple[Channel, ...] = ()
+    turning: Array | None = field(default=None, repr=False)
+    about: CompiledState | None = field(default=None, repr=False)
+    mechanism: ConstrainedLinearisation | None = field(default=None, repr=False)
+    dry: DryFriction | None = field(default=None, repr=False)
+    carrying: Carrying | None = field(default=None, repr=False)
+    at_speeds: Callable[[Array], LinearEquations] | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"<{type(self).__name__}: {len(self)} coordinates, {len(self.controls)} inputs, "
+            f"{len(self.others)} disturbances, at t = {self.state.t:g} s>"
+        )
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Places of x among the speeds."""
+        return self.model.free_speeds if self.mechanism is None else self.mechanism.places
+
+    @property
+    def tree(self) -> LoopedEngine:
+        """The scene, its loops torn open, with dry friction as the model has it."""
+        if self.mechanism is not None:
+            return self.mechanism.tree
+        return self._smooth if self.dry else self.model.looped
+
+    @cached_property
+    def _smooth(self) -> LoopedEngine:
+        assert self.dry is not None
+        return self.dry.engine(self.model)
+
+    @cached_property
+    def _named(self) -> list[tuple[str, str]]:
+        """Name and unit of x."""
+        known = dict(zip(self.model.free_speeds, self.model.increments, strict=True))
+        return [known[place] for place in self.free]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of x."""
+        return tuple(name for name, _ in self._named)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of x."""
+        return tuple(unit for _, unit in self._named)
+
+    # --- matrices ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _whole(self) -> Matrices:
+        about = self.about
+        if about is not None:
+            return self._second_order(Matrices(about.M, about.C, about.K))
+        refuse_dense(len(self), "the matrix of a linear model")
+        return self._second_order(self._of(self.tree))
+
+    @cached_property
+    def _held(self) -> Matrices:
+        return self._second_order(self._of(with_frozen_springs(self.tree, self.state)))
+
+    @cached_property
+    def _standing(self) -> Matrices:
+        return self._second_order(self._of(standing(self.tree, self.state)))
+
+    def _of(self, engine: LoopedEngine) -> Matrices:
+        """Of the scene's tree, or of it with other elements, along x."""
+        if self.mechanism is not None:
+            return self.mechanism.matrices(engine, self.state)
+        return matrices(engine, self.state, list(self.free))
+
+    def _second_order(self, found: Matrices) -> Matrices:
+        """From speeds to x': where x' = G x + du, C du = C x' - C G x and M da = M x'' - M G x';
+        then to the fixed frame."""
+        g = self.turning
+        if g is not None:
+            found = Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
+        return found if self.carrying is None else self.carrying.matrices(found)
+
+    @property
+    def has_stiffness(self) -> bool:
+        """Whether there is a K."""
+        return True
+
+    @property
+    def M(self) -> Array:
+        """(n, n) mass matrix."""
+        return self._whole.M
+
+    @property
+    def C(self) -> Array:
+        """(n, n): `damping` and `gyroscopic`."""
+        return self._whole.C
+
+    @property
+    def K(self) -> Array:
+        """(n, n): `elastic`, `geometric` and `load`."""
+        return self._whole.K
+
+    @cached_property
+    def damping(self) -> Array:
+        """(n, n) of C: what laws, shapes and loads resist to speeds."""
+        return self.C - self._standing.C + self._of_shapes(lambda body: body.D)
+
+    @property
+    def gyroscopic(self) -> Array:
+        """(n, n) of C: inertia forces of the motion that there is; zero at rest."""
+        return self.C - self.damping
+
+    @cached_property
+    def elastic(self) -> Array:
+        """(n, n) of K: slopes of the laws of hinges and springs, and the stiffness of shapes."""
+        return self.K - self._held.K + self._of_shapes(lambda body: body.K)
+
+    @cached_property
+    def sprung(self) -> Array:
+        """(n, n) of `elastic`: slopes of the laws of springs between ends."""
+        lawless = self._second_order(self._of(without_laws(self.tree)))
+        return lawless.K - self._held.K
+
+    @property
+    def load(self) -> Array:
+        """(n, n) of K: what loads do that go along with a body or follow an expression."""
+        return self._held.K - self._standing.K
+
+    @property
+    def geometric(self) -> Array:
+        """(n, n) of K: gravity, inertia forces, and standing loads and tensions, on a scene that
+        is displaced."""
+        return self._standing.K - self._of_shapes(lambda body: body.K)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of v."""
+        return tuple(one.name for one in self.controls)
+
+    @property
+    def disturbances(self) -> tuple[str, ...]:
+        """Names of w."""
+        return tuple(one.name for one in self.others)
+
+    @property
+    def drives(self) -> tuple[int, ...]:
+        """Places among the speeds of the drives whose motions are inputs or disturbances."""
+        moved = [one.moves for one in (*self.controls, *self.others) if one.moves]
+        return tuple(dict.fromkeys(speed for one in moved for speed, _ in one)) if moved else ()
+
+    @property
+    def driven(self) -> tuple[str, ...]:
+        """Names of d, the coordinates of these drives beside the state."""
+        return tuple(coordinate(self.model, speed) for speed in self.drives)
+
+    @cached_property
+    def _moved(self) -> tuple[Array, Array]:
+        """K_driven and C_driven."""
+        if self.drives and self.carrying is not None:
+            raise SceneError(
+                "fixed frame: motions of drives are not inputs there; leave them out, or push by "
+                "efforts and forces"
+            )
+        found = [self.driving(((speed, 1.0),)) for speed in self.drives]
+        both = [(one.stiffness, one.damping) for one in found]
+        wide = np.reshape(both, (len(found), 2, len(self)))
+        return wide[:, 0].T, wide[:, 1].T
+
+    def driving(self, moves: Moves) -> Columns:
+        """(n,): what drives that go along with one motion ask for."""
+        if self.mechanism is not None:
+            return self.mechanism.driven(self.state, moves)
+        wide = columns_of(self.model.looped, self.state, moves)
+        return Columns(*(one[list(self.free)] for one in wide))
+
+    @property
+    def C_driven(self) -> Array:
+        """(n, drives): what d' adds on the left, C_driven d'."""
+        return self._moved[1]
+
+    @property
+    def K_driven(self) -> Array:
+        """(n, drives): what d adds on the left, K_driven d."""
+        return self._moved[0]
+
+    @cached_property
+    def V(self) -> Array:
+        """(n, inputs): what a unit of each input does."""
+        return self.pushed(self.controls)
+
+    @cached_property
+    def W(self) -> Array:
+        """(n, disturbances): what a unit of each disturbance does."""
+        return self.pushed(self.others)
+
+    def pushed(self, channels: Sequence[Channel]) -> Array:
+        """(n, channels): what a unit of each push does."""
+        if self.mechanism is None:
+            found = columns(self.tree, self.state, channels, list(self.free))
+        else:
+            found = self.mechanism.pushed(self.state, channels)
+        return found if self.carrying is None else self.carrying.pushed(found)
+
+    def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
+        """A matrix of the flexible bodies in its place among all."""
+        found = np.zeros((self.model.nu, self.model.nu))
+        for name, slots in self.model.layout.modal.items():
+            found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible[name])
+        if self.mechanism is not None:
+            return self.mechanism.ways.T @ found @ self.mechanism.ways
+        return found[np.ix_(self.free, self.free)]
+
+    def symbolic(self, keep: Sequence[str]) -> SymbolicLinearModel:
+        """The same M, C, K, V and W as SymPy expressions in names that are kept: numbers of the
+        scene as in `with_parameters` ("rod1.mass", "gravity[1]"), and coordinates and speeds of
+        hinges ("shoulder.angle").
+
+        The schedule that makes the numbers is run on symbols.  What is not kept goes in as the
+        number that it is, as a fraction where that is a short decimal: the state and its
+        accelerations too, so that an equilibrium that depends on kept numbers stays where it is,
+        and a law that changes its branch keeps the one that it has there.
+
+        Raises SceneError for a name that is none of these, for numbers of flexible bodies, and for
+        scenes and expressions that are too large.
+        """
+        if self.carrying is not None:
+            raise SceneError(
+                "symbolic: linear models in the fixed frame are numbers; take M, C and K"
+            )
+        if self.mechanism is not None:
+            raise SceneError(
+                "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
+                "and K as they are"
+            )
+        names = keep if isinstance(keep, str) else require_texts("keep", keep, "rod1.mass")
+        found: SymbolicLinearModel = self.model.fusion.symbolic(self, names)
+        return found
+
+    @cached_property
+    def pencil(self) -> Pencil:
+        """M, C and K as operators, O(bodies), without the matrices; of states of trees at rest."""
+        return Pencil(self.tree, self.state, list(self.free))
+
+    def spread(self, x: NDArray[Any]) -> NDArray[Any]:
+        """(nu, ...) increments along all speeds of those of x (n, ...)."""
+        if self.carrying is not None:
+            x = np.linalg.solve(self.carrying.turned, x)
+        if self.mechanism is not None:
+            return np.asarray(self.mechanism.ways @ x)
+        found = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)
+        found[list(self.free)] = x
+        return found
+
+    def displaced(self, x: Array) -> Array:
+        """q (nq,) of the state after increments x (n,)."""
+        model, speeds = self.model, self.spread(x)
+        engine, state = model.looped, self.state
+        moved = state.q + engine.rates(state.t, state.q, speeds, engine.start_memory())
+        return SceneSystem(engine).start(state.t, moved, state.u)[: model.nq]

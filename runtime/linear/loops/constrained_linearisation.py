@@ -1,0 +1,225 @@
+"""A scene with closed loops beside a state: its tree along the motions that loops leave.
+
+Torn open, the scene is a tree with R(q, u, a) the efforts that it needs; the loads of its loops,
+with multipliers lambda, make R + J^T lambda = 0.  Of independent motions x, dq = N x, and
+N^T J^T = 0 wherever the loops are closed, so that the equations are N^T R = 0 and their slopes at
+rest
+
+    M = N^T R_a N,   C = N^T R_u N,   K = N^T (R_q + d(J^T lambda)/dq) N
+
+with lambda as it stands there: what turning loads add is K of the closed scene, whose tangent has
+the loads of its loops in it, less that of the tree.  Beside a state that moves or does not last
+C and K come from the slopes of its accelerations (`Motion`).
+
+Where a drive goes by d, all else goes along: dq = N x + n d, x being zero in n, and what it asks
+for are the same slopes along n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+
+from ...engine.compiled_scene import CompiledScene
+from ...engine.looped_engine import LoopedEngine
+from ...packing.loops.system_variants import with_loops_open
+from ...packing.scene_packing import packed_system
+from ..drive_inputs import Columns, Moves, coordinate, slopes_along
+from ..input_channels import Channel, columns
+from ..mck_matrices import Matrices, State, matrices
+from ..operating_point.friction import DryFriction
+from .accelerating_states import Motion
+
+#: Exact slopes (nu, nu) of the accelerations at a state, by the names of `Derivatives`.
+Slopes = Callable[[State], Mapping[str, Array]]
+
+
+@dataclass(frozen=True, eq=False)
+class ConstrainedLinearisation:
+    """The motions of a mechanism beside one state.
+
+    Attributes:
+        tree: the scene with its loops open, with dry friction as the linear model has it.
+        free: places of the speeds of the tree that nobody imposes.
+        places: those of the n independent ones, which x are.
+        ways: (nu, n) all speeds for a unit of each.
+        turned: (n, n) stiffness of the loads that the loops carry, at rest.
+        motion: what speeds do where the state does not rest, from `slopes`.
+        rough: the tree with all its dry friction, whose slopes those are.
+        dry: what of it the tree has viscous dampers for.
+        model: whose mechanism it is.
+    """
+
+    model: CompiledScene = field(repr=False)
+    tree: LoopedEngine
+    free: tuple[int, ...]
+    places: tuple[int, ...]
+    ways: Array
+    turned: Array = field(repr=False)
+    motion: Motion | None = field(default=None, repr=False)
+    slopes: Slopes | None = field(default=None, repr=False)
+    rough: LoopedEngine | None = field(default=None, repr=False)
+    dry: DryFriction | None = field(default=None, repr=False)
+
+    @property
+    def turning(self) -> Array | None:
+        """(n, n) G of x' = G x + dv; None where x are integrals of the speeds v."""
+        return None if self.motion is None else self.motion.turning
+
+    def at(self, state: State) -> ConstrainedLinearisation | None:
+        """The same motions at another state."""
+        if self.slopes is None:
+            return mechanism_at(self.model, state, self.dry)
+        return moving_at(self.model, state, self.slopes, self.places, self.dry)
+
+    def matrices(self, engine: LoopedEngine, state: State) -> Matrices:
+        """Those of the tree, or of it with other elements, along x."""
+        found = self._along(engine, state)
+        if self.motion is None:
+            return Matrices(found.M, found.C, found.K + self.turned)
+        whole = self.motion.matrices(found.M)
+        rough = self.rough or self.tree
+        if engine is rough:
+            return whole
+        tree = self._along(rough, state)  # what the loops carry is the same for both
+        return Matrices(found.M, whole.C + found.C - tree.C, whole.K + found.K - tree.K)
+
+    def _along(self, engine: LoopedEngine, state: State) -> Matrices:
+        swept = None if self.motion is None else self.motion.swept
+        return _along(engine, state, self.free, self.ways, self.ways, swept)
+
+    def pushed(self, state: State, channels: Sequence[Channel]) -> Array:
+        """(n, channels): what a unit of each push does along x, of drives their accelerations."""
+        every, found = list(range(len(self.ways))), np.zeros((len(self.places), len(channels)))
+        still = [k for k, one in enumerate(channels) if one.drive < 0]
+        pushes = [channels[k] for k in still]
+        found[:, still] = self.ways.T @ columns(self.tree, state, pushes, every)
+        for k, one in enumerate(channels):
+            if one.drive >= 0:
+                found[:, k] = -self.driven(state, one.moves).inertia
+        return found
+
+    def driven(self, state: State, moves: Moves) -> Columns:
+        """Along x (n,): what drives that go along with one motion ask for."""
+        along = np.sum([factor * self._driving(state, speed) for speed, factor in moves], axis=0)
+        closed, tree = self.model.looped, self.tree
+        rows = _with_own_still(self.model, self.ways)
+        return Columns(
+            rows.T @ slopes_along(closed, state, along).stiffness,
+            self.ways.T @ slopes_along(tree, state, along).damping,
+            self.ways.T @ slopes_along(tree, state, along).inertia,
+        )
+
+    def _driving(self, state: State, speed: int) -> Array:
+        """n (nu,): all speeds for a unit of one that is imposed.  SceneError where loops do not let
+        it move, and beside a state that does not rest."""
+        if self.motion is not None:
+            raise SceneError(
+                f'"{coordinate(self.model, speed)}": motions of drives of closed loops are inputs '
+                "beside a state at rest, and this one moves or does not last; leave them out"
+            )
+        freedom = self.model.freedom
+        assert freedom is not None
+        along = freedom.driving(state.q, speed)
+        if not np.isfinite(along).all():
+            raise SceneError(
+                f'"{coordinate(self.model, speed)}": the loops do not let this drive move at this '
+                "state; take a state beside it, or another input"
+            )
+        return np.asarray(along - self.ways @ along[list(self.places)])
+
+    def rows(
+        self, state: State, orders: Mapping[int, Array], drives: Collection[int]
+    ) -> dict[int, Array]:
+        """Rows (k, nu) of what goes with all speeds, by powers of s, as rows of x and of drives in
+        the places of these."""
+        found, places = dict[int, Array](), list(self.places)
+        for order, wide in orders.items():
+            rows = found.setdefault(order, np.zeros_like(wide))
+            rows[:, places] += wide @ self.ways
+            for speed in drives:
+                rows[:, speed] += wide @ self._driving(state, speed)
+            for lower, along in () if self.motion is None else self.motion.below(order):
+                found.setdefault(lower, np.zeros_like(wide))[:, places] += wide @ along
+        return found
+
+
+def mechanism_at(
+    model: CompiledScene, state: State, dry: DryFriction | None = None
+) -> ConstrainedLinearisation | None:
+    """The mechanism at a state at rest, with viscous dampers for `dry` friction; None for a tree.
+
+    Raises NumericalFailure where loops leave no one set of motions.
+    """
+    if model.freedom is None:
+        return None
+    found = _mechanism(model, state, model.freedom.chosen(state.q), dry)
+    tree, free, ways = found.tree, found.free, found.ways
+    carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
+    return replace(found, turned=carried - _along(tree, state, free, ways, ways).K)
+
+
+def moving_at(
+    model: CompiledScene, state: State, slopes: Slopes, places: tuple[int, ...] | None = None,
+    dry: DryFriction | None = None,
+) -> ConstrainedLinearisation | None:  # fmt: skip
+    """The mechanism at a state that moves or does not last, along independent speeds in `places`
+    or those that are well chosen there, with viscous dampers for `dry` friction; None for a tree.
+
+    Raises SceneError for scenes whose accelerations have no slopes, NumericalFailure as
+    `mechanism_at`.
+    """
+    if model.freedom is None:
+        return None
+    found = _mechanism(model, state, places or model.freedom.chosen(state.q), dry)
+    return replace(found, motion=Motion.of(slopes(state), found.places, found.ways), slopes=slopes)
+
+
+def _mechanism(
+    model: CompiledScene, state: State, places: tuple[int, ...], dry: DryFriction | None
+) -> ConstrainedLinearisation:
+    """Without what its loads and its motion do."""
+    freedom = model.freedom
+    assert freedom is not None
+    ways, n = freedom.following(state.q, places), len(places)
+    rough, tree = torn_trees(model, dry)
+    return ConstrainedLinearisation(
+        model, tree, model.free_speeds, places, ways, np.zeros((n, n)), rough=rough, dry=dry
+    )
+
+
+def torn_trees(model: CompiledScene, dry: DryFriction | None) -> tuple[LoopedEngine, LoopedEngine]:
+    """The scene with its loops open, and the same with viscous dampers for `dry` friction."""
+    packed, system = model.packed, with_loops_open(model.packed.system)
+    tree = LoopedEngine(packed_system(system, packed))
+    if not dry:
+        return tree, tree
+    return tree, LoopedEngine(
+        packed_system(replace(system, laws=dry.replaced(system.laws)), packed)
+    )
+
+
+def _along(
+    engine: LoopedEngine, state: State, free: tuple[int, ...], ways: Array, rows: Array,
+    swept: Array | None = None,
+) -> Matrices:  # fmt: skip
+    """N^T (M, C, K) N, and of speeds that go along with x besides."""
+    found, n, left = matrices(engine, state, list(free)), ways[list(free)], rows[list(free)]
+    mass, damping, stiffness = (left.T @ matrix @ n for matrix in (found.M, found.C, found.K))
+    if swept is not None:
+        stiffness = stiffness + left.T @ found.C @ swept[list(free)]
+    return Matrices(mass, damping, stiffness)
+
+
+def _with_own_still(model: CompiledScene, ways: Array) -> Array:
+    """`ways` (nu, n) of the tree alone: what hinges that close loops do is load on their bodies."""
+    system, rows = model.packed.system, ways.copy()
+    for one in system.closures:
+        first = int(system.places["u"][one.frame])
+        rows[first : first + system.body(one.frame).nu] = 0.0
+    return rows

@@ -1,0 +1,82 @@
+"""M, C and K of a scene as operators: products and solutions in O(bodies), no matrix.
+
+    Z(s) = s^2 M + s C + K
+
+is the tangent of an implicit step whose acceleration is s^2 x and whose speed is s x, so that the
+sweep that factors the one factors the other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from ..engine.looped_engine import LoopedEngine
+from ..engine.tangent_matrix import TangentMatrix
+from .mck_matrices import State
+
+
+class Pencil:
+    """The operators on the n free speeds of one scene at rest at a state.  One thread."""
+
+    def __init__(self, engine: LoopedEngine, state: State, free: list[int]) -> None:
+        self.tangent, self.free = TangentMatrix(engine), np.array(free, dtype=np.int64)
+        self._places = slice(None) if len(free) == engine.nu else self.free
+        self.state, self._nothing = state, np.zeros(engine.nu)
+        self.tangent.allow_negative()
+        self._no_q = np.zeros(engine.nq)
+        self._inertia = engine.inertia_alone
+        self._strained = self._required(self._nothing)
+        self._factored: tuple[float, float] | None = None
+        self._begin()
+
+    def __len__(self) -> int:
+        return len(self.free)
+
+    def _begin(self) -> None:
+        state = self.state
+        self.tangent.residual(state.t, state.q, state.u, state.a)
+
+    def _full(self, x: Array) -> Array:
+        whole = self._nothing.copy()
+        whole[self._places] = np.ravel(x)
+        return whole
+
+    def mass(self, x: Array) -> Array:
+        """M x: the efforts of inertia alone, at rest."""
+        return self._required(self._full(x)) - self._strained
+
+    def _required(self, a: Array) -> Array:
+        engine, state = self._inertia, self.state
+        memory = self.tangent.memory
+        return engine.inverse_dynamics(state.t, state.q, self._nothing, a, memory)[self._places]
+
+    def damping(self, x: Array) -> Array:
+        """C x."""
+        return self.tangent.slope(0.0, self._no_q, self._full(x), self._nothing)[self._places]
+
+    def stiffness(self, x: Array) -> Array:
+        """K x."""
+        moved = self.tangent.rates(self.state.q, self._full(x))
+        self._begin()
+        return self.tangent.slope(0.0, moved, self._nothing, self._nothing)[self._places]
+
+    def skew(self) -> float:
+        """How far K is from symmetric, in parts, along two directions."""
+        x, y = np.random.default_rng(0).standard_normal((2, len(self)))
+        first, second = self.stiffness(x), self.stiffness(y)
+        size = float(np.linalg.norm(first) * np.linalg.norm(y))
+        return abs(float(y @ first - x @ second)) / size if size else 0.0
+
+    def factor(self, square: float, rate: float = 0.0) -> None:
+        """Factor square M + rate C + K.  NumericalFailure where that is singular."""
+        if self._factored != (square, rate):
+            self._factored = None
+            self._begin()
+            self.tangent.factor(square, 1.0, 0.0, rate)
+            self._factored = square, rate
+
+    def solve(self, r: Array) -> Array:
+        """x of the last factorisation: (square M + rate C + K) x = r."""
+        return self.tangent.solve(self._full(r))[self._places]

@@ -1,0 +1,80 @@
+"""How many natural motions an undamped scene has below a frequency.
+
+As many omega^2 are below a number as K - square M has negative eigenvalues, and those of a tree
+are those of the pivots of its sweep (Sylvester; Wittrick and Williams, Q. J. Mech. Appl. Math. 24
+(1971) 263-284).
+
+The pivots do not see springs between bodies.  Let A be K - square M and T the same of the tree with
+these springs taken apart (`with_springs_grounded`): both are symmetric where loads have a
+potential, and A - T has low rank.  Where the columns of W span T^-1 (A - T), A x = T x for every x
+with W^T T x = 0, so that nothing couples such x with W (Haynsworth, Linear Algebra Appl. 1 (1968)
+73-81):
+
+    negative(A) = negative(T) + negative(W^T A W) - negative(W^T T W).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from .frozen_loads import with_springs_grounded
+from .matrix_operators import Pencil
+
+#: Directions in which two bodies can pull each other.
+_WAYS = 12
+#: Columns that others make up to this part are no more; matrices that far from symmetric are none.
+_NEW, _SYMMETRIC = 1e-12, 1e-6
+
+
+class Counting:
+    """Counts of motions of one scene."""
+
+    def __init__(self, pencil: Pencil) -> None:
+        self.whole = self.tree = pencil
+        if pencil.tangent.coupled:
+            apart = with_springs_grounded(pencil.tangent.engine, pencil.state)
+            self.tree = Pencil(apart, pencil.state, pencil.free.tolist())
+
+    def below(self, square: float) -> int | None:
+        """How many omega^2 are below `square`; None where loads reach across the tree that are no
+        springs, or have no potential."""
+        efforts = self._efforts
+        self.tree.factor(-square)
+        found = self.tree.tangent.count_negative()
+        if found is None or not efforts.size:
+            return found
+        more = self._more(square, _basis([self.tree.solve(column) for column in efforts.T]))
+        return None if more is None else found + more
+
+    @cached_property
+    def _efforts(self) -> Array:
+        """(n, r) efforts that springs give across the tree, whatever moves: found by moving all at
+        random, as often as they have ways to pull."""
+        n = len(self.whole)
+        if self.tree is self.whole:
+            return np.zeros((n, 0))
+        forces = len(self.tree.tangent.engine.packed.system.forces)
+        moves = np.random.default_rng(0).standard_normal((min(n, _WAYS * forces), n))
+        return _basis([self.whole.stiffness(x) - self.tree.stiffness(x) for x in moves])
+
+    def _more(self, square: float, w: Array) -> int | None:
+        """How many more eigenvalues of A are negative than of T; None where either is not
+        symmetric."""
+        found = []
+        for pencil in (self.whole, self.tree):
+            pressed = [pencil.stiffness(x) - square * pencil.mass(x) for x in w.T]
+            matrix = w.T @ np.array(pressed).T
+            if np.abs(matrix - matrix.T).max() > _SYMMETRIC * np.abs(matrix).max():
+                return None
+            found.append(int((np.linalg.eigvalsh((matrix + matrix.T) / 2) < 0).sum()))
+        return found[0] - found[1]
+
+
+def _basis(columns: list[Array]) -> Array:
+    """(n, r) orthonormal, of columns (n,)."""
+    left, sizes, _ = np.linalg.svd(np.array(columns).T, full_matrices=False)
+    return left[:, sizes > _NEW * sizes.max(initial=0)]

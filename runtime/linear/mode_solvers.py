@@ -1,0 +1,108 @@
+"""The motions of a linear model, from its matrices or, of many, by its operators."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.linalg import eig, eigh
+
+from mstmm.array_validation import Array
+from mstmm.errors import NumericalFailure
+
+from .modes import Modes
+
+if TYPE_CHECKING:
+    from .linear_equations import LinearEquations
+
+#: More coordinates than this have their slowest motions found without a matrix.
+_DENSE = 400
+#: A stiffness further from symmetric than this, in parts, is not that of a potential.
+_SYMMETRIC = 1e-9
+#: Rates in parts of the fastest that are rounding: eigenvalues are found to its square.
+_ROUNDING = 1e-7
+
+
+def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Modes:
+    """See `Linear.modes`."""
+    few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
+    few = few and linear.mechanism is None and linear.carrying is None
+    if count is None or not few or linear.turning is not None:
+        found = _dense(linear, damped)
+        return found if count is None else found.first(count)
+    return _few(linear, count, damped)
+
+
+def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
+    from . import shift_invert_modes
+
+    pencil = linear.pencil
+    x = np.random.default_rng(0).standard_normal(len(linear))
+    with_c = bool(pencil.damping(x).any()) if damped is None else damped
+    if with_c or pencil.skew() > _SYMMETRIC:
+        slowest = shift_invert_modes.damped_modes(pencil, count, with_c)
+        return Modes(linear, slowest.values, slowest.shapes, None)
+    slowest = shift_invert_modes.undamped_modes(pencil, count)
+    return _ordered(linear, slowest.values, slowest.shapes, slowest.complete)
+
+
+def _dense(linear: LinearEquations, damped: bool | None) -> Modes:
+    """All motions, from the matrices."""
+    with_c = linear.C.any() if damped is None else damped
+    if with_c or not _from_potential(linear.K):
+        return _general(linear, linear.C if with_c else np.zeros_like(linear.C))
+    return _ordered(linear, *_symmetric(linear), True)
+
+
+def _ordered(
+    linear: LinearEquations, squares: Array, shapes: Array, complete: bool | None
+) -> Modes:
+    """Of omega^2; below 0 a motion grows and another decays, and the growing one is told."""
+    rates = np.sqrt(np.abs(squares))
+    values = np.where(squares < 0, rates + 0j, 1j * rates)
+    order = np.argsort(rates, kind="stable")
+    return Modes(linear, values[order], shapes[:, order], complete)
+
+
+def _from_potential(stiffness: Array) -> bool:
+    scale = np.abs(stiffness).max(initial=0)
+    return bool(np.abs(stiffness - stiffness.T).max(initial=0) <= _SYMMETRIC * scale)
+
+
+def _symmetric(linear: LinearEquations) -> tuple[Array, Array]:
+    stiffness, mass = (linear.K + linear.K.T) / 2, (linear.M + linear.M.T) / 2
+    try:
+        squares, shapes = eigh(stiffness, mass)
+    except np.linalg.LinAlgError:
+        raise _no_inertia(linear) from None
+    rounding = (_ROUNDING**2) * np.abs(squares).max(initial=0)
+    return np.where(np.abs(squares) <= rounding, 0.0, squares), shapes
+
+
+def _general(linear: LinearEquations, c: Array) -> Modes:
+    """The quadratic problem, made linear."""
+    n = len(linear)
+    zero, one = np.zeros((n, n)), np.eye(n)
+    a = np.block([[zero, one], [-linear.K, -c]])
+    b = np.block([[one, zero], [zero, linear.M]])
+    pairs: Any = eig(a, b)
+    values, vectors = pairs
+    if not np.isfinite(values).all():
+        raise _no_inertia(linear)
+    rounding = _ROUNDING * np.abs(values).max(initial=0)
+    values = np.where(np.abs(np.imag(values)) <= rounding, np.real(values), values)
+    values = np.where(np.abs(np.real(values)) <= rounding, 1j * np.imag(values), values)
+    kept = np.flatnonzero(np.imag(values) >= 0)
+    kept = kept[np.argsort(np.abs(values[kept]), kind="stable")]
+    shapes = vectors[:n, kept]
+    places = np.abs(shapes).argmax(axis=0)
+    shapes = shapes / shapes[places, np.arange(len(kept))]
+    return Modes(linear, values[kept].astype(np.complex128), shapes, True)
+
+
+def _no_inertia(linear: LinearEquations) -> NumericalFailure:
+    names = ", ".join(linear.coordinates[:3])
+    return NumericalFailure(
+        f"modes: the mass matrix of {names}, ... is not positive, so that some motion has no "
+        "frequency; give what these move inertia"
+    )

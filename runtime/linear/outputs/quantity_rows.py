@@ -1,0 +1,238 @@
+"""Quantities of results in linear models: coordinates and their rates, motions of bodies and ends,
+springs, and inputs of the scene.
+
+Each is a row of numbers times a power of s, or some of them.  By duality a point goes along n with
+each coordinate as far as a unit force there along n pushes that coordinate, a body turns as far as
+a unit moment does, and a spring becomes longer as far as a unit of its effort does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.expression.expression import Name
+from mstmm.scene.tables.law import SpringLaw
+from mstmm.scene.validators.validation_messages import did_you_mean
+
+from ...engine.body_references import BodyReferences
+from ...engine.engine_calls import Probe
+from ...engine.observation_columns import (
+    BODY_QUANTITIES,
+    POINT_COLUMNS,
+    acceleration_name,
+    rate_unit,
+)
+from ...packing.coordinate_layout import HingeSlots
+from ...result.sources.springs import SPRING_QUANTITIES, length_and_rate
+from ..input_channels import Channel
+from .output_rows import LinearQuantity, Part, formula, scaled
+
+if TYPE_CHECKING:
+    from ..linear_equations import LinearEquations
+
+#: Quantities of ends: what pushes along them, and the power of s that makes them of a place.
+_KINDS = {
+    "position": ("force", 0), "velocity": ("force", 1), "acceleration": ("force", 2),
+    "angular_velocity": ("moment", 1), "angular_acceleration": ("moment", 2),
+}  # fmt: skip
+
+
+class QuantityLookup:
+    """Looks up quantities of one linear model by name."""
+
+    def __init__(self, linear: LinearEquations) -> None:
+        self._linear, self._state = linear, linear.state
+        self._model, self._layout = linear.model, linear.model.layout
+        self._ends = BodyReferences(linear.model.scene.skeleton)
+        self._springs = {one.name: k for k, one in enumerate(linear.model.scene.spring)}
+
+    def read(self, name: Name) -> LinearQuantity:
+        """What a name in an expression is; the time stands still."""
+        if name.text == "t":
+            return LinearQuantity("t", "s", (), lambda: self._state.t)
+        return self.get(name.text)
+
+    def get(self, name: str) -> LinearQuantity:
+        """The quantity; SceneError with the nearest name where linear models have none of this."""
+        found = self.find(name)
+        if found is None:
+            coordinates = self._linear.coordinates or ("shoulder.angle",)
+            outputs = (one.name for one in self._model.scene.output)
+            raise SceneError(
+                f'"{name}": expected a coordinate such as "{coordinates[0]}", its rate, a motion '
+                'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", what a spring '
+                f"does, or an output of the scene{did_you_mean(name, (*outputs, *self.known()))}"
+            )
+        return found
+
+    def find(self, name: str) -> LinearQuantity | None:
+        """The quantity; None where linear models have none of this name.
+
+        Raises SceneError for what a moving state does not give.
+        """
+        owner, _, last = name.rpartition(".")
+        if name in self._model.scene.channels:
+            return self._input(name)
+        if owner in self._layout.hinges:
+            found = self._of_hinge(self._layout.hinges[owner], last)
+            if found is not None:
+                return found
+        if owner in self._springs and last in SPRING_QUANTITIES:
+            return self._of_spring(self._springs[owner], last)
+        return self._of_end(name, owner, last)
+
+    def known(self) -> Iterator[str]:
+        """Names, those of coordinates first."""
+        yield from self._linear.coordinates
+        yield from self._model.scene.channels
+        yield from (f"{spring}.{kind}" for spring in self._springs for kind in SPRING_QUANTITIES)
+        for slots in self._layout.hinges.values():
+            yield from (f"{slots.name}.{name}" for name in slots.u_names)
+            yield from (f"{slots.name}.{acceleration_name(name)}" for name in slots.u_names)
+        for end in self._ends:
+            for kind in _KINDS:
+                yield from (f"{end}.{kind}.{axis}" for axis in BODY_QUANTITIES[kind].labels)
+
+    # --- inputs -----------------------------------------------------------------------------------
+
+    def _input(self, name: str) -> LinearQuantity:
+        scene, t = self._model.scene, self._state.t
+        inputs = {one.name: one.unit for one in scene.input}
+        unit = (inputs | {one.name: one.unit for one in scene.signal})[name]
+        through = ((name, 1.0),) if name in inputs else ()
+        return LinearQuantity(name, unit, (), lambda: scene.channels[name].value(t), through)
+
+    # --- hinges -----------------------------------------------------------------------------------
+
+    def _of_hinge(self, slots: HingeSlots, last: str) -> LinearQuantity | None:
+        """A coordinate, its rate or acceleration by name or number."""
+        state = self._state
+        for k, speed in enumerate(slots.u_names):
+            row, place = ((slots.u + k, 1.0),), slots.u + k
+            if last == f"{speed}_increment" and not slots.straight:
+                unit = slots.u_units[k].removesuffix("/s")
+                return LinearQuantity(f"{slots.name}.{last}", unit, (Part(0, row),), lambda: 0.0)
+            if last in _aliases(speed, "u", k, slots.nu):
+                unit, parts = slots.u_units[k], (Part(1, row),)
+                return LinearQuantity(f"{slots.name}.{speed}", unit, parts, _entry(state.u, place))
+            rate = acceleration_name(speed)
+            if last in _aliases(rate, "udot", k, slots.nu):
+                unit, parts = rate_unit(slots.u_units[k]), (Part(2, row),)
+                return LinearQuantity(f"{slots.name}.{rate}", unit, parts, _entry(state.a, place))
+        for k, (name, unit) in enumerate(zip(slots.q_names, slots.q_units, strict=True)):
+            if last in _aliases(name, "q", k, slots.nq):
+                parts = (Part(0, self._follows(slots, k)),)
+                return LinearQuantity(
+                    f"{slots.name}.{name}", unit, parts, _entry(state.q, slots.q + k)
+                )
+        return None
+
+    def _follows(self, slots: HingeSlots, k: int) -> tuple[tuple[int, float], ...]:
+        """How coordinate k of a hinge goes with increments along its speeds."""
+        if slots.straight:
+            return ((slots.u + k, 1.0),)
+        engine, state = self._model.looped, self._state
+        found = []
+        for place in range(slots.u, slots.u + slots.nu):
+            unit = np.eye(1, engine.nu, place)[0]
+            rates = engine.rates(state.t, state.q, unit, engine.start_memory())
+            found.append((place, float(rates[slots.q + k])))
+        return tuple(found)
+
+    # --- ends -------------------------------------------------------------------------------------
+
+    def _of_end(self, name: str, owner: str, last: str) -> LinearQuantity | None:
+        """A component of what a body or end does."""
+        for kind, (push, order) in _KINDS.items():
+            about, end = BODY_QUANTITIES[kind], owner.removesuffix(f".{kind}")
+            for axis, short in enumerate(about.short):
+                long = end != owner and last == about.labels[axis]
+                if (long or (end == owner and last == short)) and end in self._ends:
+                    self._refuse_in_motion(name, order)
+                    end = self._ends.canonical(end) or end
+                    part = Part(order, push=Channel("", "", end=end, kind=push, axis=axis))
+                    full = f"{end}.{kind}.{about.labels[axis]}"
+                    return LinearQuantity(full, about.unit, (part,), self._number(end, kind, axis))
+        return None
+
+    def _number(self, end: str, kind: str, axis: int) -> Callable[[], float]:
+        column = POINT_COLUMNS[kind].start + axis
+        return lambda: float(self._points([self._model.packed.end(end)])[0, column])
+
+    def _points(self, ends: Sequence[tuple[int, tuple[float, ...], tuple[float, ...]]]) -> Array:
+        """(ends, 24) at the state, as of `Observation.points`."""
+        engine, state = self._model.looped, self._state
+        found = engine.observe(
+            np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None],
+            [Probe(*end) for end in ends], parts=("points",),
+        )  # fmt: skip
+        return found.points[0]
+
+    def _refuse_in_motion(self, name: str, order: int) -> None:
+        if order and self._state.u.any():
+            raise SceneError(
+                f'"{name}": the state moves, so that places change what speeds of ends are; ask '
+                "for coordinates, their rates or positions there"
+            )
+
+    # --- springs ----------------------------------------------------------------------------------
+
+    def _of_spring(self, number: int, kind: str) -> LinearQuantity:
+        spring = self._model.scene.spring[number]
+        name = f"{spring.name}.{kind}"
+        if kind != "length":
+            self._refuse_in_motion(name, 1)
+        push = Channel("", "", spring=number)
+        if kind != "effort":
+            order = 0 if kind == "length" else 1
+            parts = (Part(order, push=push),)
+            return LinearQuantity(
+                name, SPRING_QUANTITIES[kind].unit, parts, lambda: self._motion(number)[order]
+            )
+        if spring.type != "spring":
+            raise SceneError(
+                f'"{name}": its law is that of a force element "{spring.type}", whose slopes are '
+                f"not known here; ask for {spring.name}.length"
+            )
+        return self._effort(name, spring.law, number)
+
+    def _motion(self, number: int) -> tuple[float, float]:
+        """Length in m and its rate."""
+        near, far = self._points(self._model.packed.system.forces[number].ends)
+        length, rate = length_and_rate((far - near)[None, :6])
+        return float(length[0]), float(rate[0])
+
+    def _effort(self, name: str, law: SpringLaw, number: int) -> LinearQuantity:
+        """What stiffness and damping give, and the expression."""
+        length, rate = (self._of_spring(number, kind) for kind in ("length", "length_rate"))
+
+        def read(one: Name) -> LinearQuantity:
+            if not one.hinge and one.quantity in ("q", "u"):
+                return length if one.quantity == "q" else rate
+            return self.read(one)
+
+        given = formula(law.effort, name, SPRING_QUANTITIES["effort"].unit, read)
+        springs, damps = (
+            scaled(one.parts, -x) for one, x in ((length, law.stiffness), (rate, law.damping))
+        )
+
+        def value() -> float:
+            x, v = self._motion(number)
+            return given.value() - law.stiffness * (x - law.rest) - law.damping * v
+
+        return replace(given, parts=(*given.parts, *springs, *damps), value=value)
+
+
+def _aliases(name: str, short: str, k: int, count: int) -> tuple[str, ...]:
+    """What results call an entry of a hinge: shoulder.angle, shoulder.q[0], shoulder.q."""
+    return (name, f"{short}[{k}]", short) if count == 1 else (name, f"{short}[{k}]")
+
+
+def _entry(values: Array, place: int) -> Callable[[], float]:
+    return lambda: float(values[place])

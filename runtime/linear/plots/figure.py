@@ -1,0 +1,44 @@
+"""Figures: made empty, settled, written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from mstmm.errors import SceneError
+from mstmm.optional_packages import figure_class
+
+from ...platform_support.safe_files import replace_atomically, require_path
+
+_FORMATS = (".png", ".svg", ".pdf")
+
+
+def figure(height: float = 4.5, width: float = 7.5) -> Any:
+    """An empty figure.  EnvironmentFailure without the extra."""
+    return figure_class()(figsize=(width, height), layout="constrained")
+
+
+def write(made: Any, path: str | Path | None) -> None:
+    """The figure into a file (None: none); its ending says how.  SceneError for another ending."""
+    if path is None:
+        return
+    path = require_path(path)
+    if path.suffix.lower() not in _FORMATS:
+        raise SceneError(f'picture "{path}": expected a name ending in {", ".join(_FORMATS)}')
+    with replace_atomically(path) as temporary:
+        made.savefig(temporary, dpi=150, format=path.suffix[1:].lower())
+
+
+def refuse_none(values: NDArray[Any]) -> None:
+    """SceneError where there is no column of numbers to draw."""
+    if not values.shape[1]:
+        raise SceneError("nothing moves in this scene, so that there is nothing to draw")
+
+
+def finish_axes(*axes: Any) -> None:
+    """A light grid, and no frame above and to the right."""
+    for axis in axes:
+        axis.grid(alpha=0.3, which="both", lw=0.5)
+        axis.spines[["top", "right"]].set_visible(False)

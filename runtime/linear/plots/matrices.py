@@ -1,0 +1,74 @@
+"""Pictures of the matrices of a linear model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from .figure import figure, refuse_none, write
+
+if TYPE_CHECKING:
+    from ..state_space import StateSpace
+
+#: Coordinates up to which every row carries its name.
+_NAMED = 40
+#: Entries below this part of the largest are as good as zero in a picture.
+_SMALL = 1e-5
+#: And so much smaller is what the marks between its ends stand for.
+_INNER = 1e-2
+
+
+def matrices(linear: StateSpace, path: str | Path | None) -> Any:
+    """M, C and K side by side, or A where there are none, each by its own colours, which go by
+    decades."""
+    drawn, names = ("MCK", linear.coordinates) if linear.has_stiffness else ("A", linear.states)
+    refuse_none(getattr(linear, drawn[0]))
+    named = len(names) <= _NAMED
+    side = float(np.clip(0.2 * len(names), 2.4, 6.0)) if named else 4.0
+    made = figure(side + 1.6, len(drawn) * side + 2.4)
+    panels = made.subplots(1, len(drawn), sharey=True, squeeze=False)[0]
+    for panel, name in zip(panels, drawn, strict=True):
+        matrix = getattr(linear, name)
+        _map(made, panel, matrix)
+        panel.set_title(name if matrix.any() else f"{name} = 0", fontsize=11)
+        if named:
+            panel.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
+            panel.set_yticks(range(len(names)), names, fontsize=7)
+        panel.set_xlabel(_unit(linear, name), fontsize=8)
+        panel.tick_params(length=0)
+    write(made, path)
+    return made
+
+
+def _unit(linear: StateSpace, name: str) -> str:
+    """Of the entries, where all coordinates have the same."""
+    if name == "A":
+        return "rates of rows per column"
+    units = set(linear.units)
+    if len(units) > 1:
+        return "rows in N or N*m"
+    per = {"M": "/s^2", "C": "/s", "K": ""}[name]
+    unit = units.pop()
+    return f"{'N' if unit == 'm' else 'N*m'} per {unit}{per}"
+
+
+def _map(made: Any, panel: Any, matrix: Array) -> None:
+    """Entries as colours, red above zero and blue below, on a scale of decades both ways."""
+    from matplotlib.colors import SymLogNorm
+
+    top = float(np.abs(matrix).max())
+    none, top = top == 0, top or 1.0
+    scale = SymLogNorm(_SMALL * top, linscale=0.5, vmin=-top, vmax=top)
+    drawn = panel.imshow(matrix, cmap="RdBu_r", norm=scale, interpolation="none")
+    panel.spines[:].set_visible(False)
+    bar = made.colorbar(drawn, ax=panel, location="bottom", shrink=0.9, pad=0.02)
+    inner = top * _INNER
+    bar.set_ticks([-top, -inner, 0, inner, top])
+    bar.set_ticklabels([f"{x:.2g}" for x in (-top, -inner, 0, inner, top)])
+    bar.ax.minorticks_off()
+    bar.ax.tick_params(labelsize=8)
+    bar.ax.set_visible(not none)  # its place is kept, so that all three are of one size

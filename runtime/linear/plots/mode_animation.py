@@ -1,0 +1,111 @@
+"""Natural motions as they move: each a stage of its own over one cycle, to choose on a page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+
+from ...integrate.c_loop import Statistics, Status
+from ...integrate.settings import Settings
+from ...result.result import Result
+from ...result.scene3d.frame_times import FrameTimes
+from ...result.scene3d.scene_builder import build_scene_graph
+from ...result.scene3d.scene_graph import SceneGraph, Solid
+from ...result.scene3d.solid_meshes import Surface, join_surfaces
+from ...result.scene3d.view import SceneView
+from ...run.trajectory import Trajectory
+from .mode_shapes import Complex, described
+from .wireframe import amplitudes
+
+if TYPE_CHECKING:
+    from ..linear_equations import LinearEquations
+
+#: Pictures of a cycle, and how long it takes on the screen, s.
+_PICTURES, _LASTS = 41, 2.0
+#: How far the point that moves most moves, in parts of the scene's size; what only turns about its
+#: own axis turns by so much, and nothing by more than the latter (rad).
+_PART, _TURNS, _MOST = 0.08, 0.5, 0.8
+_GREY = (150, 155, 162)
+
+
+def view(
+    linear: LinearEquations,
+    eigenvalues: Complex,
+    shapes: NDArray[Any],
+    which: Sequence[int],
+    amplitude: float | None,
+    title: str,
+) -> SceneView:
+    """See `Modes.view`."""
+    part = _PART if amplitude is None else amplitude
+    phases = np.linspace(0.0, 360.0, _PICTURES)
+    when = FrameTimes(np.arange(_PICTURES), phases, phases, 360.0 / _LASTS)
+    rest = _rest(linear)
+    parts = []
+    for k in which:
+        shape = shapes[:, k]
+        moved = _amplitude(linear, shape, part) * np.exp(1j * np.deg2rad(phases))[:, None] * shape
+        q = np.array([_closed(linear, linear.displaced(x)) for x in np.real(moved)])
+        stage = build_scene_graph(_standing(linear, q), title, when=when)
+        stage = replace(stage, solids=(*stage.solids, rest), clock=("phase", "deg"))
+        parts.append((f"mode {k + 1}, {described(complex(eigenvalues[k]))}", stage))
+    return SceneView(title, parts)
+
+
+def _amplitude(linear: LinearEquations, shape: Array, part: float) -> float:
+    """What a shape is multiplied with, so that it is seen and turns nothing too far."""
+    both = np.stack([np.real(shape), np.imag(shape)], axis=1)
+    found = amplitudes(linear, both, part)
+    turns = np.array([unit == "rad" for unit in linear.units])
+    most = np.abs(shape[turns]).max(initial=0.0)
+    usual = float(found[found > 0].min(initial=np.inf))
+    if not np.isfinite(usual):
+        return _TURNS / most if most > 0 else 0.0
+    return min(usual, _MOST / most) if most > 0 else usual
+
+
+def _closed(linear: LinearEquations, q: Array) -> Array:
+    """The nearest positions in which loops are closed."""
+    closed = linear.model.closed
+    if closed is None:
+        return q
+    try:
+        return closed.assembled(q, np.zeros(linear.model.nu), (), ())[0]
+    except SceneError:  # so far it does not go: it is drawn as the shape says
+        return q
+
+
+def _standing(linear: LinearEquations, q: Array) -> Result:
+    """Positions (f, nq) as a run that stands still in each, at the time of the state."""
+    model, count, t = linear.model, len(q), linear.state.t
+    memory = np.tile(model.looped.start_memory(), (count, 1))
+    none: dict[str, Any] = {one.name: 0 for one in fields(Statistics)}
+    return Result(model, Trajectory(
+        np.full(count, t), q, np.zeros((count, model.nu)), memory, np.zeros(count),
+        np.zeros(count, dtype=np.int64), Status.FINISHED, "", Settings(t, t), Statistics(**none),
+    ))  # fmt: skip
+
+
+def _rest(linear: LinearEquations) -> Solid:
+    """Bodies where they are at rest, clear."""
+    still = _standing(linear, linear.state.q[None])
+    zero = np.zeros(1)
+    stage = build_scene_graph(
+        still, "", when=FrameTimes(np.zeros(1, dtype=np.int64), zero, zero, 1.0)
+    )
+    return Solid("rest", "bodies", join_surfaces(list(_surfaces(stage))), _GREY, 0.28)
+
+
+def _surfaces(stage: SceneGraph) -> list[Surface]:
+    found = [Surface(bent.vertices[0], bent.faces) for bent in stage.bent]
+    for solid in stage.solids:
+        if solid.owner.startswith("bodies/") and not solid.hidden:
+            found.append(solid.surface.placed(*stage.poses[solid.owner].at(0)))
+    return found

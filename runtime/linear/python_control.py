@@ -1,0 +1,54 @@
+"""Linear models for python-control (extra: control), with names of states, inputs and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.optional_packages import missing_package_error
+
+from .harmonic.steady_states import refuse_turning_outputs
+from .input_channels import Channel, some_names
+from .outputs.linear_outputs import outputs_of, rows_of
+from .state_space import StateSpace
+
+
+def output_matrices(
+    linear: StateSpace, outputs: Sequence[str] | None, pushes: Sequence[Channel], b: Array
+) -> tuple[tuple[str, ...], Array, Array]:
+    """(names, C (outputs, states), D (outputs, pushes)) of y = C z + D v, where `b` (states,
+    pushes) is what v adds to d/dt z."""
+    named = None if outputs is None else some_names("outputs", outputs)
+    shown = outputs_of(linear, named)
+    refuse_turning_outputs(linear, shown)
+    c, d = linear.observed(rows_of(linear, shown, pushes), b)
+    return tuple(one.name for one in shown), c, d
+
+
+def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: bool) -> Any:
+    """See `Linear.to_control`."""
+    try:
+        import control
+    except ImportError as error:
+        raise missing_package_error("control", "a system for python-control", error) from None
+    b, pushes = linear.B, linear.controls
+    if disturbances:
+        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.others)
+    if not pushes:
+        raise SceneError(
+            'the model has no inputs: name some, as in linearize(inputs=["shoulder.effort"])'
+        )
+    names, c, d = output_matrices(linear, outputs, pushes, b)
+    return control.ss(
+        linear.A, b, c, d, states=list(map(_signal, linear.states)),
+        inputs=[_signal(one.name) for one in pushes], outputs=list(map(_signal, names)),
+    )  # fmt: skip
+
+
+def _signal(name: str) -> str:
+    """A dot parts the names of systems and signals there."""
+    return name.replace(".", "_").replace("[", "_").replace("]", "")

@@ -1,0 +1,276 @@
+"""Natural motions along a parameter of a scene, and the value at which a scene loses its stability.
+
+The motions are paired from one value to the next by their eigenvalues and shapes, so that curves
+may cross: with the spin of a shaft they are Campbell's diagram, with any other number of the scene
+its root locus.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import linear_sum_assignment
+
+from mstmm.argument_validation import abbreviate
+from mstmm.array_validation import Array, Integers, finite_array
+from mstmm.errors import NumericalFailure, SceneError
+from mstmm.risk import RUN, AssessedAnswer, DeferredRisks, Risk
+
+from ..risk_checks.answers import merge_over_values
+from . import file_formats
+from .modes import Complex, Modes
+
+if TYPE_CHECKING:
+    from .linear_model import Linear
+
+#: A scene made linear at a value of its parameter.
+At = Callable[[float], "Linear"]
+
+#: What `Model.locus` may be asked for.
+FRAMES = ("auto", "fixed", "rotating")
+#: How near a critical value is found, in parts of the range that is searched.
+_NEAR = 1e-12
+#: Part of its first value to which the slowest frequency falls before a limit point.
+_VANISHING = 0.03
+#: Ratio of loads to those that buckle in another plane up to which both buckle together.
+_ALIKE = 1.02
+
+
+@dataclass(frozen=True, eq=False)
+class RootLocus(AssessedAnswer):
+    """Motions over a parameter: `values` (m,), `eigenvalues` (m, k), a column for each motion; nan
+    where it is not among those of its value.
+
+    Attributes:
+        frame: of frequencies and whirl, "fixed" or "rotating", in which coordinates of spinning
+            bodies turn along: a motion that whirls at f in the fixed frame has |f - spin| there.
+        whirl: (m, k) sense of the motions about the spin; see `Modes.whirl`.
+        findings: risks at each value, and of the diagram.
+    """
+
+    parameter: str
+    values: Array = field(repr=False)
+    eigenvalues: Complex = field(repr=False)
+    frame: str = "fixed"
+    whirl: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    findings: Iterable[Risk] = field(default=(), repr=False)
+
+    @property
+    def frequency(self) -> Array:
+        """(m, k), Hz."""
+        return np.abs(self.eigenvalues.imag) / (2 * np.pi)
+
+    @property
+    def growth(self) -> Array:
+        """(m, k), 1/s; negative of what decays."""
+        return np.asarray(self.eigenvalues.real)
+
+    def plot(self, path: str | Path | None = None, orders: ArrayLike = ()) -> Any:
+        """`matplotlib.figure.Figure`: frequencies and growth over the parameter, with lines at
+        `orders` times a parameter that is a spin in rad/s, of the same frame; written to `path`
+        where it is given.
+
+        Raises EnvironmentFailure without the extra `plot`.
+        """
+        from .plots.bode_and_locus import locus
+
+        lines = np.atleast_1d(finite_array("orders", orders)).tolist()
+        return locus(
+            self.parameter, self.values, self.eigenvalues, path, lines, self.frame, self.whirl
+        )
+
+    def to_dataset(self) -> Any:
+        """`xarray.Dataset` of frequency and growth.  EnvironmentFailure without the extra."""
+        along = ("value", "motion")
+        arrays: dict[str, Any] = {
+            "frequency": (along, self.frequency, {"units": "Hz"}),
+            "growth": (along, self.growth, {"units": "1/s"}),
+            "whirl": (along, self.whirl),
+        }
+        coords = {"value": self.values, "motion": np.arange(1, self.eigenvalues.shape[1] + 1)}
+        about = {"parameter": self.parameter, "frame": self.frame}
+        return file_formats.xarray().Dataset(arrays, coords, about)
+
+    def _rows(self) -> Iterator[tuple[str, ...]]:
+        """A row for each value."""
+        motions = range(1, self.eigenvalues.shape[1] + 1)
+        yield (
+            self.parameter,
+            *(f"{k} {part}" for k in motions for part in ("frequency [Hz]", "growth [1/s]")),
+        )
+        pairs = np.stack([self.frequency, self.growth], axis=2).reshape(len(self.values), -1)
+        for value, row in zip(self.values.tolist(), pairs.tolist(), strict=True):
+            yield tuple(map(repr, (value, *row)))
+
+    def save(self, path: str | Path) -> Path:
+        """Frequencies and growth: .nc (extra io) or .csv, a row for each value of the parameter.
+
+        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        """
+        return file_formats.save(path, self.to_dataset, self._rows())
+
+
+def trace_modes(
+    at: At, parameter: str, values: Array, count: int | None, damped: bool | None, frame: str
+) -> RootLocus:
+    """Motions at each value, those that go on in one column; `frame` as in `Model.locus`."""
+    models, risks = _framed([at(value) for value in values.tolist()], parameter, frame)
+    found = [linear.modes(count, damped) for linear in models]
+    width = max(len(one) for one in found)
+    if not width:
+        raise SceneError("nothing moves in this scene, so it has no motions to follow")
+    rows = np.full((len(found), width), np.nan + 0j)
+    turns = np.full(rows.shape, np.nan)
+    order: Integers = np.arange(len(found[0]))
+    rows[0, order], turns[0, order] = found[0].eigenvalues, found[0].whirl
+    for row, (before, now) in enumerate(pairwise(found), start=1):
+        order = _paired(before, now, order, width)
+        rows[row, order], turns[row, order] = now.eigenvalues, now.whirl
+    rotating = any(one.frame == "rotating" for one in found)
+    frame = "rotating" if rotating else "fixed"
+    each = list(zip(values.tolist(), found, strict=True))
+    findings = DeferredRisks(
+        lambda: (*risks, *merge_over_values(parameter, [(x, one.risks) for x, one in each]))
+    )
+    return RootLocus(parameter, values, rows, frame, turns, findings)
+
+
+def _framed(
+    models: list[Linear], parameter: str, frame: str
+) -> tuple[list[Linear], tuple[Risk, ...]]:
+    """The models in the frame that is asked for, and what "auto" could not do."""
+    if frame not in FRAMES:
+        raise SceneError(f'frame = {abbreviate(frame)}: expected "auto", "fixed" or "rotating"')
+    if frame == "rotating":
+        return models, ()
+    try:
+        return [linear.to_fixed_frame() for linear in models], ()
+    except SceneError as error:
+        if frame == "fixed":
+            raise
+        return models, (_rotating(parameter, str(error)),)
+
+
+def _rotating(parameter: str, why: str) -> Risk:
+    return Risk(
+        "rotating-frame", parameter,
+        f"frequencies are those of the rotating frame, of which critical speeds cannot be read off "
+        f"({why.removeprefix('fixed frame: ')})",
+        'give frame="rotating" if these are what you want, or make the rotor axisymmetric',
+    )  # fmt: skip
+
+
+def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
+    """The column of each motion: of the one before that it is most like."""
+    apart = np.abs(before.eigenvalues[:, None] - now.eigenvalues[None, :])
+    apart /= np.maximum(1e-300, np.maximum(before.omega[:, None], now.omega[None, :]))
+    unit = [x / np.linalg.norm(x, axis=0) for x in (before.shapes, now.shapes)]
+    unlike = 1 - np.abs(np.conj(unit[0]).T @ unit[1])
+    rows, columns = linear_sum_assignment(apart + unlike)
+    places = np.full(len(now), -1)
+    places[columns] = order[rows]
+    spare = iter(sorted(set(range(width)) - set(places.tolist())))
+    return np.array([next(spare) if place < 0 else place for place in places])
+
+
+@dataclass(frozen=True)
+class StabilityLimit(AssessedAnswer):
+    """The value of a parameter beyond which a motion grows; `kind` is "divergence" (a stiffness is
+    lost, as in buckling) or "flutter", `frequency` in Hz, in the fixed frame unless `frame` is
+    "rotating"; `findings` are the risks of the last stable state below it."""
+
+    parameter: str
+    value: float
+    kind: str
+    frequency: float
+    moving: tuple[str, ...]
+    findings: Iterable[Risk] = field(default=(), repr=False)
+    frame: str = "fixed"
+
+
+def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
+    """An edge between `low`, where no motion grows, and `high`, where one does, by
+    bisection; of several edges between them one is found.
+
+    Raises SceneError where the ends are not so.
+    """
+    first, last = _modes_at(at, low), _modes_at(at, high)
+    if first is None or _growing(first) is not None:
+        raise SceneError(
+            f"{parameter} = {low:g}: a motion grows there already; expected a value at which the "
+            "scene is stable"
+        )
+    if last is not None and _growing(last) is None:
+        raise SceneError(
+            f"{parameter} = {high:g}: no motion grows there; expected a value beyond the critical"
+        )
+    below, span = first, high - low
+    while abs(high - low) > _NEAR * abs(span):
+        middle = (low + high) / 2
+        if middle in (low, high):
+            break
+        found = _modes_at(at, middle)
+        if found is not None and _growing(found) is None:
+            low, below = middle, found
+        else:
+            high, last = middle, found
+    growing = None if last is None else _growing(last)
+    value, names = (0j, ()) if last is None or growing is None else (
+        complex(last.eigenvalues[growing]), tuple(last.moving(growing))
+    )  # fmt: skip
+    kind = "divergence" if value.imag == 0 else "flutter"
+    lost = _lost_equilibrium(parameter, high, first, below) if last is None else ()
+    return StabilityLimit(
+        parameter, (low + high) / 2, kind, abs(value.imag) / (2 * np.pi), names,
+        DeferredRisks(lambda: (*lost, *_risks_below(parameter, low, below))),
+        "fixed" if last is None else last.frame,
+    )  # fmt: skip
+
+
+def _modes_at(at: At, value: float) -> Modes | None:
+    """All motions; None where the scene has no equilibrium."""
+    try:
+        (linear,), _ = _framed([at(value)], "", "auto")
+        modes = linear.modes()
+    except NumericalFailure:
+        return None
+    if not len(modes):
+        raise SceneError("nothing moves in this scene, so that nothing grows")
+    return modes
+
+
+def _growing(modes: Modes) -> int | None:
+    """The motion that grows most."""
+    k = int(modes.eigenvalues.real.argmax())
+    return k if modes.eigenvalues[k].real > 0 else None
+
+
+def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
+    """Risks of the last stable state; that its loads take away a stiffness is the answer itself,
+    also where another plane buckles at the same value, and fast motions have no part in it."""
+    own = (
+        risk for risk in below.risks
+        if risk.name not in ("unstable", "unrestrained", "frequency-range")
+        and not (risk.name == "buckling" and risk.figure is not None and risk.figure < _ALIKE)
+    )  # fmt: skip
+    return merge_over_values(parameter, [(value, own)])
+
+
+def _lost_equilibrium(parameter: str, high: float, first: Modes, below: Modes) -> tuple[Risk, ...]:
+    """No equilibrium was found beyond the value: at a limit point a stiffness vanishes before."""
+    if float(below.omega.min()) <= _VANISHING * float(first.omega.min()):
+        return ()
+    return (
+        Risk(
+            "no-equilibrium", RUN,
+            f"at {parameter} = {high:g} no equilibrium was found, but no stiffness vanishes before "
+            "that: the value may be where the search failed, not where stability ends",
+            "look at equilibrium() on both sides of the value",
+        ),
+    )  # fmt: skip

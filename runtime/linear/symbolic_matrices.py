@@ -1,0 +1,32 @@
+"""Symbolic: the matrices of a linear model as formulas in names that were kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicLinearModel:
+    """M x'' + C x' + K x = V v + W w with SymPy matrices; rows, columns and units as in `Linear`.
+
+    Attributes:
+        M, C, K, V, W: `sympy.ImmutableMatrix`, in the symbols that were kept.
+        symbols: `sympy.Symbol` by name.
+        numbers: what each symbol is in the scene or state, SI units; `M.subs(numbers)` is the
+            matrix of the linear model.
+        coordinates: names of x.
+        inputs, disturbances: names of v and w.
+    """
+
+    M: Any = field(repr=False)
+    C: Any = field(repr=False)
+    K: Any = field(repr=False)
+    V: Any = field(repr=False)
+    W: Any = field(repr=False)
+    symbols: Mapping[str, Any]
+    numbers: Mapping[Any, float]
+    coordinates: tuple[str, ...]
+    inputs: tuple[str, ...] = ()
+    disturbances: tuple[str, ...] = ()

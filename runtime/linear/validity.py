@@ -1,0 +1,171 @@
+"""What a linear model cannot say of its scene: states that do not last, and what nothing holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.risk import RUN, Risk, information
+from mstmm.safe_text import abbreviate_names
+
+from ..risk_checks.answers import find_state_risks
+from .input_channels import GROUND, Channel
+from .mode_solvers import modes
+from .modes import INPUT_RISKS, OUTPUT_LEFT_OUT
+from .operating_point.changes import MATRICES, find_changes
+from .operating_point.departure import LARGEST, Departure, find_departure
+from .operating_point.later import LaterStates
+from .operating_point.starting import find_start_risks
+from .operating_point.sticking import friction_risks, saturation_risks, ways_of
+from .outputs.linear_outputs import left_out
+from .rotors.blades import find_blades
+
+if TYPE_CHECKING:
+    from .linear_equations import LinearEquations
+
+#: Efforts that are rounding, in parts of those that cancel.
+_CANCELLED = 1e-11
+#: Coordinates up to which all motions are looked for.
+_ALL_MOTIONS = 400
+
+
+def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
+    """Risks of the state and of what the linear model leaves out, the gravest first."""
+    state = linear.state
+    yield from find_state_risks(linear.model, state.t, state.q, state.u)
+    unsteady = list(_unsteady(linear))
+    yield from unsteady
+    if len(linear) <= LARGEST:
+        yield from friction_risks(linear)
+    yield from saturation_risks(linear, ways_of(linear))
+    yield from find_start_risks(linear, _ALL_MOTIONS)
+    changing = {risk.element for risk in unsteady}
+    yield from (one for one in without_effect(linear, linear.V) if one.element not in changing)
+    yield from find_omissions(linear)
+    if len(linear) <= _ALL_MOTIONS:
+        yield from modes(linear, None, None).motion_risks()
+    else:
+        yield information(
+            "stability-unknown", RUN,
+            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
+            "nothing pushes back", "look at the slowest modes, modes(count=...)",
+        )  # fmt: skip
+
+
+def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
+    """What of the scene a linear model leaves out: controllers, outputs, the time."""
+    for one in linear.model.scene.controller:
+        yield information(
+            "controller-left-out",
+            f'controller "{one.name}"',
+            f'controller "{one.name}" is left out: its inputs '
+            f"({abbreviate_names(list(one.outputs))}) "
+            "stand still at the values of the scene",
+            "close the loop by the inputs of this model",
+        )
+    for name, why in left_out(linear):
+        yield information(
+            "output-left-out", f'output "{name}"', f"output {name} is not among the outputs: {why}",
+            "name an output that has a linear form",
+        )  # fmt: skip
+    if linear.model.packed.system.timed:
+        yield information(
+            "time-dependent", RUN, f"loads depend on time: linearised at t = {linear.state.t:g} s",
+            "give the time that is meant, t=...",
+        )  # fmt: skip
+
+
+def find_response_risks(
+    linear: LinearEquations, pushes: Sequence[Channel], are_outputs_chosen: bool = False
+) -> Iterator[Risk]:
+    """Risks of a linear model for its steady response to some inputs, which a growing motion
+    prevents; inputs and outputs that were not requested are left out."""
+    asked = {f'input "{one.name}"' for one in pushes}
+    for risk in linear.risks:
+        if risk.name in INPUT_RISKS and risk.element not in asked:
+            continue
+        if not (are_outputs_chosen and risk.name == OUTPUT_LEFT_OUT):
+            yield replace(risk, doubt=True) if risk.name == "unstable" else risk
+
+
+def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
+    """A state that does not last, or along whose motion matrices and inputs change."""
+    later = LaterStates(linear)
+    leaving = find_departure(linear, later)
+    if leaving is not None:
+        yield departure_risk(linear.state.t, leaving, later.cause)
+    if len(linear) > LARGEST:
+        if later.sparse:
+            yield information(
+                "stability-unknown", RUN,
+                f"more than {LARGEST} coordinates: not examined for matrices that change along "
+                "the motion or with time", "look at a smaller part of the scene",
+            )  # fmt: skip
+        return
+    asked = (*linear.controls, *(() if linear.disturbances == GROUND else linear.others))
+    changing = find_changes(linear, later, asked)
+    if MATRICES in changing:
+        yield Risk(
+            "changing-coefficients", RUN,
+            "the matrices change along the motion of this state or with time: frequencies and "
+            "growth of one moment are not those of the motion",
+            "take to_fixed_frame(), which has constant matrices where the rotor is isotropic"
+            if find_blades(linear)
+            else "simulate the motion, or linearise about a state that keeps its matrices",
+        )  # fmt: skip
+    yield from (changing_risk(linear, name) for name in changing if name != MATRICES)
+
+
+def changing_risk(linear: LinearEquations, name: str) -> Risk:
+    """An input or output whose column or row changes."""
+    return Risk(
+        "changing-input", f'input "{name}"',
+        f"{name} changes its effect along the motion of this state or with time: the model has "
+        f"that of t = {linear.state.t:g} s", "take efforts and speeds of hinges, or simulate",
+    )  # fmt: skip
+
+
+def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
+    """A state at t (s) that does not last."""
+    names = abbreviate_names(leaving.coordinates)
+    if leaving.t == t:
+        means = (
+            f"the state does not last: {names} accelerate there, so that the model holds beside "
+            "the motion through it, and only for a moment"
+        )
+    else:
+        means = f"the state of t = {t:g} s does not last: {cause}, {leaving} moves {names}"
+    return Risk(
+        "unsteady-state", names, means, "take an equilibrium or a steady motion, or simulate",
+        abs(leaving.effort), None, leaving.unit,
+    )  # fmt: skip
+
+
+def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
+    """Inputs whose effects, columns (n, inputs), are zero."""
+    for name, column in zip(linear.inputs, effects.T, strict=True):
+        if len(linear) and not column.any():
+            yield information(
+                "input-without-effect", f'input "{name}"', f"input {name} has no effect here",
+                "choose another input or state",
+            )  # fmt: skip
+
+
+def is_unsteady(linear: LinearEquations) -> bool:
+    """Whether closed loops are at a state that does not last, so that accelerations turn rows."""
+    if linear.mechanism is None or find_departure(linear) is None:
+        return False
+    return not _balanced(linear, linear.mechanism.ways)
+
+
+def _balanced(linear: LinearEquations, ways: Array) -> bool:
+    """Whether what pushes along the motions of a mechanism is rounding of what cancels there, which
+    may still move what hardly anything holds."""
+    state, tree = linear.state, linear.tree
+    efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.a, tree.start_memory())
+    left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
+    return bool((left <= _CANCELLED * whole).all())

@@ -1,0 +1,156 @@
+"""Results out of files: their scenes are validated and compiled again."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mstmm.argument_validation import require_path
+from mstmm.errors import MstmmError, SceneError
+from mstmm.optional_packages import missing_package_error
+from mstmm.scene import Scene
+
+from ..engine.fused_code import NoFusedCode
+from ..kernels import kernel_store
+from ..kernels.kernel_fingerprint import kernels_hash
+from ..platform_support.safe_files import require_regular_file, seal_is_broken
+from ..result import mesh_files
+from ..result.batch_result import BATCH_FORMAT
+from ..result.export import provenance
+from ..result.export.column_files import READERS, ColumnFile
+from ..result.factory import result_of
+from ..result.result import Result
+from ..result.result_record import Record
+from ..run.trajectory import Trajectory
+from .model import Model
+
+
+def load_result(path: str | Path) -> Result | ColumnFile:
+    """A result that was saved: of NetCDF with its scene compiled again, so that every quantity is
+    there; of CSV and MATLAB files (.csv, .mat) the columns, which can be drawn and compared.
+
+    Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
+    """
+    path = require_path("result file", path)
+    require_regular_file(path, "result file")
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        return load_netcdf(path)
+    if not path.is_file():
+        raise SceneError(f'result file "{path}": there is no such file')
+    found = reader(path)
+    found.lost = frozenset({*dir(Result), *Record.__annotations__}) - frozenset(dir(found))
+    return found
+
+
+def load_netcdf(path: Path) -> Result:
+    """A result saved as NetCDF; see `load_result`."""
+    require_regular_file(path, "result file")
+    try:
+        import h5netcdf  # noqa: F401
+        import xarray
+    except ImportError as error:
+        raise missing_package_error("io", "a NetCDF file", error) from None
+    if not path.is_file():
+        raise SceneError(f'result file "{path}": there is no such file')
+    if seal_is_broken(path):  # before HDF5, which such a file may crash or occupy for ever
+        raise SceneError(
+            f'result file "{path}": it is damaged, or was changed since it was written; make it '
+            "again, or write what you changed to another file"
+        )
+    data = _read(xarray, path)
+    if data.attrs.get("format") == BATCH_FORMAT:
+        raise SceneError(
+            f'result file "{path}": this is a batch of runs; open it as a Dataset: '
+            'xarray.open_dataset(path, engine="h5netcdf")'
+        )
+    if data.attrs.get("format") != "mstmm result" or "scene" not in data:
+        raise SceneError(f'result file "{path}": not a result of mstmm')
+    try:
+        if int(data.attrs["format_version"]) > provenance.FORMAT:
+            raise SceneError(f'result file "{path}": written by a newer mstmm; install that one')
+        return _rebuilt(data, path)
+    except MstmmError as error:
+        if str(path) in str(error):
+            raise
+        raise SceneError(f'result file "{path}": {error}') from None
+    except _NOT_OURS as error:
+        raise SceneError(
+            f'result file "{path}": it was changed or damaged ({type(error).__name__}: {error}); '
+            "make it again"
+        ) from None
+
+
+#: What numbers and texts raise that are not as they were written.
+_NOT_OURS = (KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
+
+
+def _read(xarray: Any, path: Path) -> Any:
+    """All of a file.  SceneError for whatever the libraries make of one that is cut or overwritten.
+
+    Objects of theirs that are given up half made complain, past every caller, as they go: they go
+    here, unheard.
+    """
+    previous, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        try:
+            with xarray.open_dataset(path, engine="h5netcdf", decode_times=False) as file:
+                return file.load()
+        except Exception as error:
+            reason = str(error)
+        gc.collect()  # the exception, which held them, is gone
+    finally:
+        sys.unraisablehook = previous
+    raise SceneError(f'result file "{path}": not a NetCDF file ({reason})')
+
+
+def _completed(model: Model, run: Trajectory) -> Trajectory:
+    """The run with columns of memory that files had not until 2026-11-24: whether a step of a scene
+    with loops ended near a singular pose; and until 2026-11-29: which rows are at rest.  Nothing
+    went by these when they were made."""
+    system, rows = model.packed.system, run.memory
+    added = [system.strained] * (system.strained >= 0), [*system.chosen]
+    for places in (added[1], added[0] + added[1]):
+        if places and rows.ndim == 2 and rows.shape[1] == system.n_memory - len(places):
+            wide = np.zeros((len(rows), system.n_memory))
+            wide[:, np.setdiff1d(np.arange(system.n_memory), places)] = rows
+            return replace(run, memory=wide)
+    return run
+
+
+def _fits(model: Model, run: Trajectory) -> bool:
+    """The sizes of every array follow from the scene and the number of samples."""
+    n, memory = len(run.t), model.packed.system.n_memory
+    expected = {
+        "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
+    }  # fmt: skip
+    states = [run.last[1:] if run.last is not None else None, run.start]
+    rows = all((q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states))
+    return rows and all(getattr(run, name).shape == shape for name, shape in expected.items())
+
+
+def _rebuilt(data: Any, path: Path) -> Result:
+    """Scene and model as they were; what only the run knew comes from the file.
+
+    Raises one of _NOT_OURS where numbers are missing or of another kind or size.
+    """
+    scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
+    elements, definitions = kernel_store.load_known(kernel_store.required_types(scene))
+    scene.check_types(definitions)
+    model = Model(scene, known=elements, sweep=data.attrs.get("sweep", "riccati"))
+    model.fusion = NoFusedCode(f"the saved run was made by the {data.attrs['engine']} one")
+    run = _completed(model, provenance.read_trajectory(data))
+    if not _fits(model, run):
+        raise SceneError(f'result file "{path}": its states do not fit its scene')
+    if data.attrs["kernels_sha256"] != kernels_hash(model.known):
+        note = "saved with other kernels: quantities beyond q and u come from the present ones"
+        run = replace(run, notes=(*run.notes, note))
+    result = result_of(model, run, provenance.error_estimate(data))
+    result.meshes = mesh_files.saved_meshes(data)
+    return result

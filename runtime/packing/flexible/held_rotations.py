@@ -1,0 +1,35 @@
+"""Which rotations of a section its hinge holds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.scene.tables.hinge_frames import initial_motion_axes
+
+if TYPE_CHECKING:
+    from mstmm.scene import Hinge
+
+
+def held_turns(hinge: Hinge, rotation: Array, unknown: Array) -> Array:
+    """(3, 3) projection of rotations on those that a hinge holds; `rotation` are the axes of its
+    outboard end in those of the body, `unknown` stands for hinges with axes that turn.
+
+    A drive holds what it moves.
+    """
+    motions, facts = initial_motion_axes(hinge), hinge.facts
+    if facts is None or motions is None:
+        return unknown
+    drive = hinge.drive or (None,) * len(motions)
+    free = [k for k in facts.turns if drive[k] is None]
+    if not free:
+        return np.eye(3)
+    if len(free) >= 3:
+        return np.zeros((3, 3))
+    if len(free) > 1 or "q" in facts.varies[free[0]][3:]:
+        return unknown
+    axis = rotation @ np.array(motions[free[0]][1])
+    axis /= np.linalg.norm(axis)
+    return np.eye(3) - np.outer(axis, axis)

@@ -1,0 +1,203 @@
+"""System -> Structure for the fused engine, and the vector p of its run-time numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm import ir
+from mstmm.expression.inputs import INPUTS
+from mstmm.ir import KernelIR, Operand, Port, Statement
+from mstmm.ir import scene_structure as code
+from mstmm.ir.scene_structure import Entries, Entry, Structure
+from mstmm.numerics.dual import to_real, value_of
+
+from . import system as given
+from .expression_tapes import MOVING
+from .loops.loop_structure import with_loops
+from .scene_elements import Elements, Known
+from .system import System
+
+#: Numbers of expressions that decide which terms there are.
+_STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
+
+
+def structure_of(
+    system: System, known: Known, bake: bool = False, floors: Sequence[float] = ()
+) -> tuple[Structure, NDArray[np.float64]]:
+    """(structure, p) of a system; `known` are elements beyond the prebuilt ones.
+
+    With `bake` every number but those of inputs is part of the structure.  `floors` are those of
+    the rows of closed loops: up to them pivots are rounding.
+    """
+    structure, numbers = structure_and_numbers(system, known, bake, floors)
+    return structure, np.array(numbers)
+
+
+def structure_and_numbers(
+    system: System, known: Known, bake: bool = False, floors: Sequence[float] = ()
+) -> tuple[Structure, list[Any]]:
+    """The same with p as a list of floats and Duals."""
+    sorting, elements = _Sorting(system, bake), Elements(known)
+    gravity = sorting.entries(system.gravity)
+    bodies = tuple(body for run in system.bodies for body in sorting.bodies(run))
+    bodies, closures, rows, couplings = with_loops(bodies, system, sorting.entries, floors)
+    laws = tuple(law for run in system.laws for law in sorting.laws(run))
+    loads = tuple(map(sorting.load, system.loads))
+    forces = tuple(map(sorting.force, system.forces))
+    used = {key for body in bodies for key in (body.hinge, body.body)}
+    used |= {force.element for force in forces}
+    values, prescribed = sorting.expression(system.values), sorting.expression(system.drives)
+    coupled = sorting.expression(system.coupled)
+    read = tuple(sorted(sorting.inputs.items()))
+    structure = Structure(
+        system.nq, system.nu, len(sorting.numbers), system.held.first, gravity, bodies, laws, loads,
+        forces, values, prescribed, system.driven, closures, rows, couplings,
+        coupled, {key: elements[key].hash for key in sorted(used)}, read,
+    )  # fmt: skip
+    return structure, sorting.numbers
+
+
+class _Sorting:
+    """Sorts the numbers of a system into structural constants and places in p."""
+
+    def __init__(self, system: System, bake: bool) -> None:
+        self.moving, self.bake = system.moving, bake
+        self.numbers: list[Any] = []
+        self._start = [x for one in system.inputs for x in one.at(0.0)]
+        #: Place in p of every number of inputs that is read, by its place among them.
+        self.inputs: dict[int, int] = {}
+
+    def entries(self, values: Iterable[float], axes: bool = False) -> Entries:
+        """Zeros, and +-1 of axes, are structure; the rest goes to p."""
+        return tuple(self._entry(to_real(value), axes) for value in values)
+
+    def _entry(self, value: float, axes: bool) -> Entry:
+        if value == 0.0 or (axes and abs(value) == 1.0):
+            return value_of(value) + 0.0  # -0.0 and 0.0 are one structure
+        return self._place(value)
+
+    def _place(self, value: float) -> Entry:
+        if self.bake:
+            return value
+        self.numbers.append(value)
+        return len(self.numbers) - 1
+
+    # --- expressions --------------------------------------------------------------------------
+
+    def expression(self, kernel: KernelIR | None) -> code.ExpressionStructure | None:
+        """Expressions of the scene with their numbers taken out; None if there are none."""
+        if kernel is None:
+            return None
+        found: list[Entry] = []
+
+        def taken(operand: Operand) -> Operand:
+            if isinstance(operand, ir.Element) and operand.port == INPUTS:
+                found.append(self._input(int(operand.index[0])))
+            elif isinstance(operand, ir.Element) and operand.port == MOVING:
+                found.append(self._place(self.moving[int(operand.index[0])]))
+            elif isinstance(operand, ir.Constant) and operand.text not in _STRUCTURAL:
+                found.append(self._place(operand.number))
+            else:
+                return operand
+            return ir.Element("constants", (len(found) - 1,))
+
+        statements: list[Statement] = []
+        for statement in kernel.statements:
+            if isinstance(statement, ir.Assign):
+                statements.append(replace(statement, args=tuple(map(taken, statement.args))))
+            elif isinstance(statement, ir.Store):
+                statements.append(replace(statement, value=taken(statement.value)))
+            else:
+                statements.append(statement)
+        inputs = [port for port in kernel.inputs if port.name not in (INPUTS, MOVING)]
+        inputs.append(Port("constants", (len(found),)))
+        general = KernelIR(kernel.name, tuple(inputs), kernel.outputs, tuple(statements))
+        return code.ExpressionStructure(general, tuple(found))
+
+    def _input(self, entry: int) -> int:
+        """Place in p of a number of inputs: the same wherever it is read."""
+        if entry not in self.inputs:
+            self.inputs[entry] = len(self.numbers)
+            self.numbers.append(self._start[entry])
+        return self.inputs[entry]
+
+    # --- bodies -------------------------------------------------------------------------------
+
+    def bodies(self, run: given.BodyRun) -> Iterable[code.BodyStructure]:
+        """Every body of a run."""
+        places = zip(run.slots.q_places().tolist(), run.slots.u_places().tolist(), strict=True)
+        for k, (q, u) in enumerate(places):
+            yield self._body(run.member(k), run.place + k - 1 if k else run.parent, q, u)
+
+    def _body(self, body: given.BodyNumbers, parent: int, q: int, u: int) -> code.BodyStructure:
+        link = self._link(body)
+        connection = () if link else body.connection
+        return code.BodyStructure(
+            parent, body.hinge, body.body, q, u, body.nq, body.nu,
+            self.entries(connection[:9], axes=True), self.entries(connection[9:]),
+            self.entries(body.hinge_p),
+            (*self.entries(body.body_p), *self.entries(body.body_frame, axes=True)),
+            self.entries(body.rotor), link, body.imposed, self._modal(body.modal),
+            self._section(body.section), body.idle,
+        )  # fmt: skip
+
+    def _link(self, body: given.BodyNumbers) -> Entries:
+        """Screws about x and z of a connection between axial hinges; empty if it is none.
+
+        A slide has no coordinate that could take up a constant angle about z.
+        """
+        if not body.link or (code.rotation_coordinate(body.hinge) is None and body.link[3] != 0.0):
+            return ()
+        return (*self.entries(body.link[:2], axes=True), *self.entries(body.link[2:]))
+
+    def _arrays(self, arrays: given.Arrays) -> tuple[tuple[str, Entries], ...]:
+        named = arrays.named.items()
+        return tuple((name, self.entries(array.ravel().tolist())) for name, array in named)
+
+    def _modal(self, modal: given.ModalNumbers | None) -> code.ModalStructure | None:
+        """Modes of a flexible body; None for a body without."""
+        if modal is None:
+            return None
+        drag = () if modal.drag is None else self._arrays(modal.drag)
+        moments, matrices = self._arrays(modal.moments), dict(self._arrays(modal.matrices))
+        return code.ModalStructure(modal.n, modal.q, modal.u, moments, drag, **matrices)
+
+    def _section(self, section: given.SectionNumbers | None) -> code.SectionStructure | None:
+        """Section that a body's connection passes; None where it passes none."""
+        if section is None:
+            return None
+        return code.SectionStructure(
+            section.frame, section.inward, self._arrays(section.inputs),
+            self.entries(section.end, axes=True),
+        )  # fmt: skip
+
+    # --- laws, loads, forces --------------------------------------------------------------------
+
+    def laws(self, run: given.LawRun) -> Iterable[code.LawStructure]:
+        """Every law of a run."""
+        for law, body, twist, effort in run.each():
+            yield code.LawStructure(
+                body, law.kernel, law.coordinate, law.speed, law.n, twist, self.entries(law.p),
+                self.entries(law.axes, axes=True), effort,
+            )  # fmt: skip
+
+    def load(self, load: given.LoadNumbers) -> code.LoadStructure:
+        """A load."""
+        return code.LoadStructure(
+            load.body, load.axes, self.entries(load.axes_own, axes=True),
+            self.entries(load.offset), load.force, load.moment,
+        )  # fmt: skip
+
+    def force(self, force: given.ForceNumbers) -> code.ForceStructure:
+        """A spring."""
+        (body_f, axes_f, offset_f), (body_t, axes_t, offset_t) = force.ends
+        return code.ForceStructure(
+            force.element, body_f, body_t, self.entries(axes_f, axes=True),
+            self.entries(axes_t, axes=True), self.entries(offset_f), self.entries(offset_t),
+            self.entries(force.p), self.expression(force.effort),
+        )  # fmt: skip

@@ -1,0 +1,45 @@
+"""Derivatives of a scene's expressions -> tapes in its records, made when they are first wanted."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field
+from typing import Any
+
+from mstmm.expression.inputs import INPUTS
+from mstmm.ir import KernelIR
+from mstmm.ir.differentiation import differentiate
+from mstmm.ir.tape import compile_tape
+
+from ...kernels.tape_kernel import c_tape
+from ..system import System
+
+#: Held while tapes are made: two threads may ask at once.
+LOCK = threading.Lock()
+
+
+@dataclass
+class Slopes:
+    """Tapes of derivatives: the largest workspace of one, and what keeps them."""
+
+    slots: int = 0
+    kept: list[Any] = field(default_factory=list)
+
+
+def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
+    """Give `model` the tapes of drives, values, couplings and given efforts of springs."""
+    made = Slopes()
+
+    def tape(kernel: KernelIR | None) -> Any:
+        if kernel is None:
+            return ffi.NULL
+        ports = [port.name for port in kernel.inputs if port.name != INPUTS]
+        slope = compile_tape(differentiate(kernel, ports, values=False, guards=False))
+        made.slots = max(made.slots, slope.slots)
+        return c_tape(ffi, slope, made.kept)
+
+    model.drive_slopes, model.value_slopes = tape(system.drives), tape(system.values)
+    model.coupling_slopes = tape(system.coupled)
+    for k, force in enumerate(system.forces):
+        model.forces[k].effort_slope = tape(force.effort)
+    return made

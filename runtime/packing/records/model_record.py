@@ -1,0 +1,128 @@
+"""System -> `mstmm_model`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mstmm.array_validation import Integers
+from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
+
+from ...kernels import prebuilt_kernels
+from ..load_coupling import Reach, reach_of
+from ..loops.planarity import plane_of
+from ..scene_elements import Elements
+from ..system import ForceNumbers, LoadNumbers, System
+from .body_records import BodyRecords
+from .laws import LawRecords
+from .links import attach_runs
+from .loops import LoopRecords, attach_loops
+from .memory import Memory
+from .planar_records import attach_flat
+
+
+@dataclass(frozen=True)
+class Written:
+    """A system in the memory of C, which `kept` keeps.
+
+    Of the workspace `blocks`, `modal` and `sections` say where the numbers of bodies, flexible
+    bodies and sections begin, by places in the tree; `scratch` is behind them, where tapes need
+    `slots`.
+    """
+
+    model: Any
+    kept: list[Any]
+    blocks: Integers
+    modal: dict[int, int]
+    sections: dict[int, int]
+    scratch: int
+    slots: int
+    reach: Reach
+    loops: LoopRecords | None
+
+
+def write(system: System, elements: Elements) -> Written:
+    """The records of a system."""
+    ffi, lib = prebuilt_kernels.module()
+    memory = Memory(ffi)
+    model = memory.new("mstmm_model *")
+    model.nq, model.nu, model.n_memory = system.nq, system.nu, system.n_memory
+    model.strained = system.strained
+    model.gravity = list(system.gravity)
+    bodies = BodyRecords(system, elements, memory, lib)
+    model.bodies, model.n_bodies = bodies.records.array, system.count
+    model.n_flexible = len(bodies.modal.modal)
+    model.n_imposed = int(system.rows(lambda body: any(body.imposed)).sum())
+    drives = memory.new("mstmm_drive[]", max(1, len(system.driven)))
+    for record, (body, k) in zip(drives, system.driven, strict=False):
+        record.body, record.coordinate, record.speed = body, k, k
+    model.drives, model.n_drives = drives, len(system.driven)
+    model.drive_tape = memory.expression(system.drives)
+    laws = LawRecords(system, memory)
+    model.laws, model.n_laws = laws.records.array, laws.records.count
+    reach = reach_of(system)
+    for place in reach.placed:
+        bodies.records.array[place].placed = 1
+    loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
+    for record, load, own in zip(loads, system.loads, reach.loads, strict=False):
+        _load(record, load)
+        record.own = int(own)
+    model.loads, model.n_loads = loads, len(system.loads)
+    forces = memory.new("mstmm_force[]", max(1, len(system.forces)))
+    for record, force, own in zip(forces, system.forces, reach.forces, strict=False):
+        _force(record, force, elements, memory)
+        record.own = int(own)
+    model.forces, model.n_forces = forces, len(system.forces)
+    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
+    model.inputs = write_inputs(system.inputs, system.held.places, memory)
+    model.n_inputs = len(system.inputs)
+    model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
+    behind, loops = attach_loops(model, system, memory, lib, bodies.end)
+    axes = plane_of(system, elements)
+    if loops is not None and axes is not None:
+        behind = attach_flat(model, system, elements, memory, lib, loops.of_bodies, axes, behind)
+    scratch = attach_runs(model, system, memory, lib, behind)
+    modal = bodies.modal
+    return Written(
+        model,
+        memory.kept,
+        bodies.blocks,
+        modal.modal,
+        modal.sections,
+        scratch,
+        memory.slots,
+        reach,
+        loops,
+    )
+
+
+def write_inputs(inputs: Sequence[PiecewisePolynomial], held: Sequence[int], memory: Memory) -> Any:
+    """`mstmm_input[]` of inputs and signals: over time, or where they are held."""
+    records = memory.new("mstmm_input[]", max(1, len(inputs)))
+    written: dict[int, tuple[Any, Any]] = {}  # many trajectories may share a long signal
+    for record, one, place in zip(records, inputs, held, strict=False):
+        if id(one) not in written:
+            numbers = [x for piece in one.pieces for x in piece]
+            written[id(one)] = memory.reals(one.knots), memory.reals(numbers)
+        record.n_knots, (record.knots, record.numbers) = len(one.knots), written[id(one)]
+        record.held = place
+    return records
+
+
+def _load(record: Any, load: LoadNumbers) -> None:
+    record.body, record.offset = load.body, list(load.offset)
+    record.axes, record.axes_own = load.axes, list(load.axes_own)
+    record.force, record.moment = list(load.force), list(load.moment)
+
+
+def _force(record: Any, force: ForceNumbers, elements: Elements, memory: Memory) -> None:
+    for letter, (body, axes, offset) in zip("ft", force.ends, strict=True):
+        setattr(record, f"body_{letter}", body)
+        setattr(record, f"axes_{letter}", list(axes))
+        setattr(record, f"offset_{letter}", list(offset))
+    functions = elements[force.element].functions
+    record.wrench = functions["wrench"]
+    record.wrench_slope = functions.get("wrench_slope", memory.ffi.NULL)
+    record.p = memory.reals(force.p)
+    record.effort = memory.expression(force.effort)

@@ -1,0 +1,33 @@
+"""Rotors given to hinges for a while, to see what then moves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ...kernels import prebuilt_kernels
+from .model_record import Written
+
+
+@contextmanager
+def rotors(written: Written) -> Iterator[Callable[[int], None]]:
+    """Lets rotors of 1 kg m^2 be given to the hinges at places of the tree; all of them are taken
+    away again.  Links know no rotors, so that the sweep goes body by body meanwhile."""
+    ffi, _ = prebuilt_kernels.module()
+    rotor = ffi.new("real[]", [1.0] * 6)
+    before: dict[int, tuple[object, int]] = {}
+    model = written.model
+    posed, model.needs_pose = model.needs_pose, 1
+
+    def give(place: int) -> None:
+        record = model.bodies[place]
+        before[place] = (record.rotor, int(record.generic))
+        record.rotor, record.generic = rotor, 1
+
+    try:
+        yield give
+    finally:
+        model.needs_pose = posed
+        for place, (old, generic) in before.items():
+            record = model.bodies[place]
+            record.rotor, record.generic = old, generic

@@ -1,0 +1,187 @@
+"""Scene -> System: placement, alignment and layout of everything a scene holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from mstmm.expression.expression import Expression
+from mstmm.expression.inputs import Inputs
+from mstmm.ir import Port
+from mstmm.scene import Scene, split_reference
+from mstmm.scene.checks.topology import Topology, build_topology
+from mstmm.scene.tables.hinge import HingeTable
+from mstmm.scene.tables.loads import Load
+
+from ..discontinuities.active_expressions import active_expressions
+from ..flexible.modal_body import ModalBody
+from ..kernels.c_records import Lookup
+from .bodies import Bodies
+from .expression_tapes import MOVING, Values, drive_kernel
+from .flexible.expansion import ExpandedScene, expand
+from .force_elements.collection import forces_of
+from .hinge_laws import laws_of
+from .hinge_release import releasable
+from .loops.closures import closures_of
+from .loops.coupling_numbers import couplings_of
+from .loops.curve_constraints import elements_of
+from .loops.cut_tree import cut_loops
+from .loops.loop_detection import may_close
+from .merging import link_detection
+from .merging.right_angle_snapping import with_exact_turns
+from .merging.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, Words
+from .merging.welded_bodies import WeldedBodies, carried_in, contract_tree
+from .node_layout import layout_of
+from .scene_elements import Elements, Known
+from .scene_frames import Frames
+from .system import HeldInputs, LoadNumbers, Numbers, System
+
+
+def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> ExpandedScene:
+    """The scene of nodes; scenes without flexible bodies are their own.
+
+    `flexible` are the numbers of all modal bodies where they are known already.
+    """
+    if not (scene.beam or scene.elastic):
+        nodes, cuts = cut_loops(scene)
+        return ExpandedScene(nodes, scene, {}, cuts=cuts)
+    from ..flexible.flexible_bodies import modal_bodies
+    from .flexible.rigid_substitution import substitute_rigid_bodies
+
+    rigid = substitute_rigid_bodies(scene, flexible or {})
+    known = {name: body for name, body in (flexible or {}).items() if name not in rigid.one_way}
+    nodes, cuts = cut_loops(rigid.scene)
+    bodies = modal_bodies(rigid.scene) if flexible is None else known
+    expanded = expand(nodes, bodies, cuts)
+    expanded.described, expanded.rigidified = scene, rigid
+    expanded.nodes |= rigid.nodes
+    return expanded
+
+
+def system_of(
+    scene: Scene,
+    known: Known | None = None,
+    *,
+    align: bool = True,
+    flexible: Mapping[str, ModalBody] | None = None,
+    moving: Mapping[int, Any] | None = None,
+    simplify: Words = LINKED,
+) -> tuple[System, Frames]:
+    """The numbers of a scene, and where everything lies; `known` are elements beyond the prebuilt.
+
+    Without `align` internal frames are those of the bodies' own hinges, whatever hangs on them:
+    smooth functions of the scene's numbers.  `flexible` are the numbers of all modal bodies
+    where they are known already, `moving` those that expressions take from the port "moving".
+    `simplify` are words of `merge.simplification`.
+
+    Raises SceneError for hinges that do not form a tree or types that nobody defines.
+    """
+    expanded, told = _with_exact_turns(expansion_of(scene, flexible), simplify)
+    elements = Elements({**(known or {}), **elements_of(scene.constraint)})
+    nodes, tree = expanded.scene, build_topology(expanded.scene)
+    carried = carried_in(expanded, tree) if WELDS in simplify else WeldedBodies()
+    tree = contract_tree(tree, carried)
+    releases = {name: i for i, name in enumerate(releasable(scene))}
+    layout = layout_of(expanded, releases, elements)
+    bodies = Bodies(expanded, tree, layout, elements, releases, align, LINKS in simplify, carried)
+    runs = tuple(map(bodies.run, tree.runs))
+    if not may_close(scene):
+        told += link_detection.link_simplifications(
+            runs, (nodes.hinges.name(run.hinge) for run in tree.runs)
+        )
+    frames = Frames(
+        nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
+        Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
+        expanded, (*carried.told(nodes), *told), simplify,
+    )  # fmt: skip
+    ports = [Port(MOVING, (1 + max(moving),))] if moving else []
+    driven, values = list(_driven(nodes, tree)), Values(layout, ports)
+    remembered = len(releases) + sum(event.do == "bounce" for event in scene.events)
+    strained = remembered if may_close(scene) else -1
+    remembered += strained >= 0
+    laws = tuple(laws_of(nodes, tree, layout, values, remembered))
+    loads = tuple(_load(frames, load, values) for load in nodes.load)
+    held = _held(scene, laws[-1].next_twist if laws else remembered)
+    couplings, coupled = couplings_of(frames, runs)
+    system = System(
+        layout.nq, layout.nu, held.first + len(held.start), strained, nodes.gravity, runs,
+        laws, loads, forces_of(frames, nodes, ports),
+        values.kernel() if len(values) else None,
+        drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
+        tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
+        held, by_time(nodes, nodes.channels), moving or {}, tuple(closures_of(frames, runs)),
+        couplings, coupled,
+    )  # fmt: skip
+    return system, frames
+
+
+def _with_exact_turns(
+    expanded: ExpandedScene, simplify: Words
+) -> tuple[ExpandedScene, list[Simplification]]:
+    scene, told = expanded.scene, list[Simplification]()
+    if TURNS in simplify:
+        scene, told = with_exact_turns(scene, simplify[TURNS])
+    return (replace(expanded, scene=scene) if told else expanded), told
+
+
+def _held(scene: Scene, first: int) -> HeldInputs:
+    """The inputs that controllers set, in memory from `first` on: of each controller the number of
+    its next sample, its state, and what it holds."""
+    places, start = dict.fromkeys(scene.channels, -1), list[float]()
+    for one in scene.controller:
+        start += [math.nan, *one.filled["initial"]]
+        for name in one.outputs:
+            places[name] = first + len(start)
+            start.append(scene.channels[name].value(0.0))
+    return HeldInputs(first, tuple(places.values()), tuple(start))
+
+
+def by_time(scene: Scene, inputs: Inputs) -> bool:
+    """Whether an effort or load names the time, or an input that does not stand still."""
+    loads = (one for one in active_expressions(scene) if not (one.drive or one.condition))
+    names = {name.text for one in loads for name in one.expression.names}
+    return "t" in names or any(not inputs[name].stands for name in names & inputs.keys())
+
+
+def _driven(scene: Scene, tree: Topology) -> Iterator[tuple[int, int, Expression]]:
+    """(place of the body, coordinate, drive) of everything driven."""
+    for place, hinge in _with_drives(scene, tree):
+        for k, entry in enumerate(hinge.drive or ()):
+            if entry is not None:
+                yield place, k, entry
+
+
+def _with_drives(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTable]]:
+    """(place, table) of every hinge with a drive."""
+    tables = len(scene.hinge)
+    for run in tree.runs:
+        if run.hinge < tables:
+            if scene.hinge[run.hinge].drive is not None:
+                yield run.place, scene.hinge[run.hinge]
+            continue
+        chain = scene.chain[scene.hinges.member(run.hinge)[0]]
+        if any(table.drive is not None for table in chain.hinge):
+            for k in range(run.count):
+                yield run.place + k, chain.hinge_of(k)
+
+
+def _load(frames: Frames, load: Load, values: Values) -> LoadNumbers:
+    body, _, offset = frames.end(load.on)
+    if load.at is not None:
+        offset = frames.mass_center(load.on)
+    name = split_reference(load.on)[0] if load.axes == "body" else load.axes
+    reference = "ground" if load.axes == "inertial" else name
+    axes, own, _ = frames.end(reference)
+    return LoadNumbers(
+        body, axes, _section_axes(frames, reference) or own, offset,
+        tuple(map(values.place, load.force)), tuple(map(values.place, load.moment)),
+    )  # fmt: skip
+
+
+def _section_axes(frames: Frames, reference: str) -> Numbers:
+    """Axes of a section of a flexible body (turned with it) in those of its end; else none."""
+    node = frames.expanded.nodes.get(reference)
+    passage = frames.expanded.passages.get(node or "")
+    return () if passage is None else tuple(passage.port.rotation.T.ravel().tolist())

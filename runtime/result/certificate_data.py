@@ -1,0 +1,53 @@
+"""Data of a certificate: drifts of conserved quantities, deflections of springs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Largest change of a conserved quantity, with the scale that it is compared with."""
+
+    name: str
+    unit: str
+    largest: float
+    scale: float
+    of_what: str
+
+    @property
+    def relative(self) -> float:
+        """largest / scale; 0 where both vanish; nan where the quantity is not finite."""
+        if not self.known:
+            return np.nan
+        if self.scale > 0:
+            return self.largest / self.scale
+        return np.inf if self.largest > 0 else 0.0
+
+    @property
+    def known(self) -> bool:
+        """False where the quantity overflows or no sample has a value."""
+        return bool(np.isfinite(self.largest) and np.isfinite(self.scale))
+
+    def __str__(self) -> str:
+        if not self.known:
+            return f"not determined: no finite {self.unit} in every sample that can be evaluated"
+        text = f"{self.largest:.1e} {self.unit} of {self.scale:.3g} {self.unit} {self.of_what}"
+        return f"{text} ({self.relative:.1e})"
+
+
+@dataclass(frozen=True)
+class SpringDeflection:
+    """Largest deflection of the stiffest spring of a scene.
+
+    Attributes:
+        spring: in words, 'spring "loop"' or 'hinge "mount"'.
+        stiffness: N/m.
+        largest: m, over the samples.
+    """
+
+    spring: str
+    stiffness: float
+    largest: float

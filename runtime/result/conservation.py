@@ -1,0 +1,232 @@
+"""Energy and momentum balances of a run.
+
+Energy less work, and momentum without external loads, should stay constant.  Their drift is
+not the error of the motion, but it reveals wrong steps and wrong laws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+from mstmm.scene import Hinge, Scene
+
+from .certificate_data import Drift
+from .flexible.momentum import undeformed_inertia
+from .impacts import momentum_kept_by_impacts
+from .result_record import Record
+
+#: A hinge load counts as zero below this part of the largest one.
+_ZERO_LOAD_RATIO = 1e-9
+
+#: Fraction of the stored energy that serves as scale where hardly anything moves.
+_STORED_ENERGY_RATIO = 1e-8
+
+#: Height differences (m) below this are rounding.
+_HEIGHT_ROUNDING = 1e-15
+
+#: Maximum number of bodies sampled to estimate the extent of a scene.
+_MAX_SAMPLED_BODIES = 30
+
+
+def _max_abs(values: Array) -> float:
+    return float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+
+
+def _max_change(values: Array) -> float:
+    """Largest change (n,) from the first sample, of those that can be evaluated; nan where one of
+    them is beyond what numbers hold, or none is left."""
+    valid = values[~np.isnan(values)]
+    if not len(valid) or not np.isfinite(valid).all():
+        return np.nan
+    return float(np.max(np.abs(valid - valid[0])))
+
+
+# --- energy ---------------------------------------------------------------------------------------
+
+
+def energy_drift(result: Record) -> Drift:
+    """Drift of T + V - W relative to the largest energy exchanged: T, changes of V, W.
+
+    At rest under load nothing is exchanged: then against a part of what is stored, or against what
+    rounding of places is worth to gravity.
+    """
+    parts, work = result.energies(), result.work
+    with np.errstate(all="ignore"):  # the residual shows an overflow
+        residual = sum(parts.values(), -work)
+        overflows = any(np.isinf(part).any() for part in (*parts.values(), work))
+        exchanged = parts["kinetic"] + np.abs(work)
+        for name in ("gravity", "springs"):
+            exchanged = exchanged + np.abs(parts[name] - parts[name][:1])
+    rounding = (
+        _HEIGHT_ROUNDING * _total_mass(result) * float(np.linalg.norm(result.model.scene.gravity))
+    )
+    scale = max(_max_abs(exchanged), _STORED_ENERGY_RATIO * _max_stored_energy(parts), rounding)
+    change = np.nan if overflows else _max_change(residual)
+    return Drift("energy", "J", change if len(residual) else 0.0, scale, "exchanged")
+
+
+def _total_mass(result: Record) -> float:
+    """Total moving mass, kg."""
+    scene = result.model.scene
+    mass = sum(body.mass for body in scene.body)
+    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
+    return mass + sum(undeformed_inertia(body)[0] for body in result.model.flexible.values())
+
+
+def _max_stored_energy(parts: Mapping[str, Array]) -> float:
+    """Largest stored energy of gravity and springs, J."""
+    with np.errstate(all="ignore"):
+        return _max_abs(np.abs(parts["gravity"]) + np.abs(parts["springs"]))
+
+
+# --- momentum -------------------------------------------------------------------------------------
+
+
+def momentum_drifts(result: Record) -> list[Drift]:
+    """Drifts of the momentum components that no external load changes.
+
+    Components that are zero throughout, and those that a blow may have changed, are left out.
+    Angular momentum is taken about the origin, or about the one point of the ground through which a
+    scene is held.  Scales: sqrt(2 m T), at rest with a part of what is stored for T, and the larger
+    of the largest angular momentum and that times the scene's reach.
+    """
+    scene, drifts = result.model.scene, list[Drift]()
+    flexible = result.model.flexible
+    has_drag = any(body.drag is not None for body in flexible.values())
+    if not len(result.t) or has_drag or not _is_isolated(scene):
+        return drifts
+    bodies = scene.skeleton.bodies
+    sampled_indices = range(0, len(bodies), max(1, len(bodies) // _MAX_SAMPLED_BODIES))
+    names = [bodies.name(i) for i in sampled_indices]
+    result._observed.fetch(names)
+    reach = max((_max_abs(result.position(name)) for name in names), default=0.0)
+    pivot, pivot_label = _momentum_pivot(result, reach)
+    reach = max((_max_abs(result.position(name) - pivot) for name in names), default=0.0)
+    kinetic = _max_abs(result.energies()["kinetic"])
+    mass = _total_mass(result)
+    linear, angular = result.momentum(), result.angular_momentum()
+    angular = angular - np.cross(pivot, linear)
+    is_conserved = np.array(_unsupported_axes(result, reach, kinetic, pivot)) & _gravity_free_axes(
+        scene
+    )
+    is_conserved &= np.array([linear.any(axis=0), angular.any(axis=0)])
+    is_conserved = momentum_kept_by_impacts(
+        result, _ground_hinges(scene), pivot, is_conserved.ravel()
+    ).reshape(2, 3)
+    speed = np.sqrt(
+        2 * max(kinetic, _STORED_ENERGY_RATIO * _max_stored_energy(result.energies()))
+    ) * np.sqrt(mass)
+    scale = max(_max_abs(np.linalg.norm(angular, axis=1)), speed * reach)
+    for k, axis in enumerate("xyz"):
+        if is_conserved[0, k]:
+            change = _max_change(linear[:, k])
+            drifts.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "that moves"))
+        if is_conserved[1, k]:
+            name, change = f"angular momentum {axis}{pivot_label}", _max_change(angular[:, k])
+            drifts.append(Drift(name, "kg*m2/s", change, scale, "that turns"))
+    return drifts
+
+
+def _gravity_free_axes(scene: Scene) -> NDArray[np.bool_]:
+    """Axes (2, 3) along which gravity has no force, and about which it has no moment."""
+    has_no_gravity = np.array(scene.gravity) == 0
+    return np.array(
+        [
+            has_no_gravity,
+            [
+                has_no_gravity[[1, 2]].all(),
+                has_no_gravity[[0, 2]].all(),
+                has_no_gravity[[0, 1]].all(),
+            ],
+        ]
+    )
+
+
+def _is_isolated(scene: Scene) -> bool:
+    """Whether only uncoupled hinges and gravity act between the scene and the ground."""
+    loads = any(
+        not expression.is_zero
+        for load in scene.load
+        for expression in (*load.force, *load.moment, *(load.force_per_length or ()))
+    )
+    connections = (*scene.forces, *scene.constraint)
+    coupled_hinges = {name.hinge for coupling in scene.coupling for name in coupling.names}
+    roots = _ground_hinges(scene)
+    return (
+        not loads
+        and not any("ground" in (connection.from_, connection.to) for connection in connections)
+        and not any(hinge.name in coupled_hinges for hinge in roots)
+        and all(_is_passive(hinge) for hinge in roots)
+    )
+
+
+def _ground_hinges(scene: Scene) -> list[Hinge]:
+    """Hinges on the ground."""
+    first_hinges = zip(scene.chain, scene.hinges.starts, strict=False)
+    return [
+        *(hinge for hinge in scene.hinge if hinge.inboard_body == "ground"),
+        *(scene.hinges[first] for chain, first in first_hinges if chain.inboard == "ground"),
+    ]
+
+
+def _is_passive(hinge: Hinge) -> bool:
+    acts = any(
+        e.stiffness or e.damping or not e.effort.is_zero or e.inertia
+        or e.friction.acts or e.limits.acts
+        for e in hinge.law.entries()
+    )  # fmt: skip
+    return not acts and hinge.drive is None and hinge.release is None
+
+
+def _momentum_pivot(result: Record, reach: float) -> tuple[Array, str]:
+    """The point (3,) about which angular momentum is taken, and how its name says so.
+
+    The point of the only hinge on the ground, where it stays; else the origin.
+    """
+    roots = _ground_hinges(result.model.scene)
+    if len(roots) == 1 and not _carries_nothing(roots[0]):
+        positions = result.position(roots[0].outboard)
+        position, size = positions[0], reach + _max_abs(positions[0])
+        if (
+            np.isfinite(position).all()
+            and _max_abs(positions - position) <= _ZERO_LOAD_RATIO * size
+        ):
+            return position, f' about "{roots[0].name}"' if position.any() else ""
+    return np.zeros(3), ""
+
+
+def _carries_nothing(hinge: Hinge) -> bool:
+    """Whether a hinge transmits no load other than that of its law."""
+    return hinge.facts is not None and hinge.facts.free_body
+
+
+def _unsupported_axes(
+    result: Record, reach: float, kinetic: float, pivot: Array
+) -> tuple[list[bool], list[bool]]:
+    """Which components of force, and of moment about the pivot, the ground never passes on.
+
+    Judged against the largest loads of the scene and against its motion, whose kinetic energy is
+    what moments turn and forces move: where nothing else acts, loads are rounding.
+    """
+    scene = result.model.scene
+    roots = _ground_hinges(scene)
+    if all(map(_carries_nothing, roots)):
+        return [True] * 3, [True] * 3
+    force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
+    largest = result._observed.largest_loads()
+    sizes = (
+        max(largest[0], kinetic / reach if reach > 0 else 0.0),
+        max(largest[1] + largest[0] * reach, kinetic),
+    )
+    for hinge in roots:
+        f = result.force(hinge.name)
+        force = force + f
+        arm = result.position(hinge.outboard) - pivot
+        moment = moment + result.moment(hinge.name) + np.cross(arm, f)
+    zero = [[_max_abs(x[:, k]) <= _ZERO_LOAD_RATIO * size for k in range(3)]
+            for x, size in zip((force, moment), sizes, strict=True)]  # fmt: skip
+    return zero[0], zero[1]

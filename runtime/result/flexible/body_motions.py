@@ -1,0 +1,142 @@
+"""Flexible bodies of a run: their motion, and the loads on their sections."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.scene.checks.topology import inboard_hinges_by_body
+from mstmm.scene.validators.validation_messages import did_you_mean
+
+from .motion import Motion
+from .section_loads import LineLoad, PointLoad
+
+if TYPE_CHECKING:
+    from mstmm.scene import Hinge, Load
+
+    from ...engine.compiled_scene import CompiledScene
+    from ...flexible.modal_body import ModalBody
+    from ..observations import Observations
+
+
+class FlexibleBodies:
+    """Motions of the flexible bodies at the samples of a run, computed on first use."""
+
+    def __init__(self, model: CompiledScene, observed: Observations) -> None:
+        self.model, self.observed, self.run = model, observed, observed.run
+        self.known: Mapping[str, ModalBody] = model.flexible
+        self.one_way: Collection[str] = ()  # those that respond, and are no part of the run
+        self.unbalanced: Collection[str] = ()  # loads on their ends leave their motion out
+        self._motions: dict[str, Motion] = {}
+
+    def body(self, name: str, what: str) -> ModalBody:
+        """The numbers of a flexible body; SceneError for another body, or none, of this name."""
+        modal_body = self.known.get(self.observed.references.canonical(name) or name)
+        if modal_body is not None:
+            return modal_body
+        flexible_names = ", ".join(f'"{x}"' for x in self.known)
+        if name in self.observed.references:
+            hint_text = (
+                f"the flexible ones are {flexible_names}"
+                if flexible_names
+                else "the scene has no flexible one"
+            )
+            raise SceneError(f'"{name}": {what} is known of flexible bodies only; {hint_text}')
+        hint = did_you_mean(name, self.known)
+        raise SceneError(f'"{name}": there is no such flexible body in the scene{hint}')
+
+    def motion(self, name: str, what: str = "its motion") -> Motion:
+        """Motion of one flexible body."""
+        if name not in self._motions:
+            body = self.body(name, what)
+            slots = self.model.layout.modal[name]
+            points = self.observed.points(name)
+            self._motions[name] = Motion(
+                body, self.run.t, self.run.q[:, slots.q_slice], self.run.u[:, slots.u_slice],
+                self.observed.columns("udot", (slots.u_slice,)), points[:, 0:3],
+                points[:, 15:24].reshape(-1, 3, 3), points[:, 3:6], points[:, 9:12],
+                points[:, 6:9], points[:, 12:15],
+            )  # fmt: skip
+        return self._motions[name]
+
+    def coupled_start(self) -> tuple[CompiledScene, Array]:
+        """A model in which all of them are coupled, and its q at the start of the run."""
+        return self.model, self.run.first[1]
+
+    @cached_property
+    def gravity(self) -> Array:
+        """(3,) m/s2, inertial axes."""
+        return np.array(self.model.scene.gravity)
+
+    # --- what acts on a body --------------------------------------------------------------------
+
+    def held_end(self, name: str) -> str:
+        """Name of the inboard end of a body."""
+        hinge = self._holders.get(name)
+        if hinge is None:
+            raise SceneError(f'"{name}": no hinge holds this body')
+        return hinge.outboard_end
+
+    @cached_property
+    def _holders(self) -> dict[str, Hinge]:
+        return inboard_hinges_by_body(self.model.scene)
+
+    def held_place(self, name: str) -> float:
+        """The x in m of the section through which a beam hangs on the tree."""
+        return float(self.known[name].ports[self.held_end(name)].position[0])
+
+    def at_end(self, name: str, end: str) -> tuple[Array, Array] | None:
+        """Force and moment (n, 3) of the outside on a port of a body, at the section's point,
+        inertial axes; None where nothing is attached.  Not known of the end that is held."""
+        hinge_index = self.observed.engine.packed.hinge_position.get(f"{name}/{end}")
+        if hinge_index is None:
+            return None
+        load = self.observed.columns("loads", (hinge_index,))
+        return -load[:, :3], -load[:, 3:]
+
+    def end_loads(self, name: str) -> dict[str, tuple[Array, Array]]:
+        """Port -> force and moment (n, 3) of the outside on it, inertial axes, of all but the held
+        end."""
+        inboard_end, loads = self.held_end(name), dict[str, tuple[Array, Array]]()
+        for port in self.known[name].ports:
+            load = None if port == inboard_end else self.at_end(name, port)
+            if load is not None:
+                loads[port] = load
+        return loads
+
+    def held_load(self, name: str) -> tuple[Array, Array]:
+        """Force and moment (n, 3) of the hinge that holds a body on its held end, at the section's
+        point, inertial axes."""
+        hinge_index = self.observed.engine.packed.hinge_position[self._holders[name].name]
+        load = self.observed.columns("loads", (hinge_index,))
+        return load[:, :3], load[:, 3:]
+
+    def point_loads(self, name: str) -> list[PointLoad]:
+        """Concentrated loads on a beam, except at its inboard end."""
+        body, line_load_names = self.known[name], {load.name for load in self._spread(name)}
+        result = []
+        for port, load in self.end_loads(name).items():
+            if port not in line_load_names:
+                result.append(PointLoad(float(body.ports[port].position[0]), *load))
+        return result
+
+    def line_loads(self, name: str) -> list[LineLoad]:
+        """Loads per length on a beam."""
+        shapes, result = self.known[name].shapes, []
+        for load in self._spread(name):
+            wrench = self.at_end(name, load.name)
+            if shapes is not None and wrench is not None:
+                first, last = load.span or (0.0, shapes.length)
+                result.append(LineLoad(first, last, *wrench))
+        return result
+
+    def _spread(self, name: str) -> list[Load]:
+        return [
+            load for load in self.model.scene.load
+            if load.on == name and load.force_per_length is not None
+        ]  # fmt: skip

@@ -1,0 +1,103 @@
+"""Loads that could buckle a beam in a way for which it has no shapes.
+
+Sideways a beam buckles where the loads do more work than its stiffness takes up.  With phi the
+slope of a deflection across, compression N does the work int N phi^2 against int EI phi'^2; with
+phi the twist of its sections, moments M in the stiff plane bend it across by M phi / EI, which is
+work of int M^2 phi^2 / EI against int GI_t phi'^2 (Timoshenko and Gere, Theory of Elastic
+Stability, 2nd ed., sections 2.8 and 6.3).  Both are one question, with phi = 0 where it is held.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from ...flexible.beam.gauss_quadrature import gauss_between
+from ...flexible.beam.section_ports import BeamShapes
+from ...flexible.modal_body import ModalBody
+from .range_estimators import has_bending_shapes
+
+#: Quarter waves of phi on either side of the held section.
+_QUARTER_WAVES = 6
+#: What is shorter, as part of a beam, does not buckle.
+_MIN_LENGTH_RATIO = 0.01
+
+
+def quadrature_rule(shapes: BeamShapes, held: float) -> tuple[Array, Array]:
+    """Places and weights (m) along a beam held at x = `held`, for its shapes and phi."""
+    waves = _QUARTER_WAVES / 2 / min(map(abs, _distances_to_ends(shapes.length, held)))
+    return gauss_between(
+        np.union1d(shapes.pieces, [held]), lambda a, b: max(shapes.density(a, b), waves)
+    )
+
+
+def _distances_to_ends(length: float, held: float) -> list[float]:
+    """From the held section to either end, in m along x, but for stubs."""
+    return [reach for reach in (-held, length - held) if abs(reach) > _MIN_LENGTH_RATIO * length]
+
+
+def lateral_load_ratio(
+    body: ModalBody,
+    x: Array,
+    weights: Array,
+    held: float,
+    line: float,
+    force: Array,
+    moment: Array,
+) -> float | None:
+    """Largest load over the one that buckles the beam in a way for which it has no shapes.
+
+    `force` and `moment` (n, m, 3) in N and N*m are what its sections carry, in their own axes, at
+    the points x (m,) in m of a `quadrature_rule`.  It is held at x = `held` (m) alone, and `line`
+    in m is the length of the straight line of beams that it is a part of.  None for a beam with
+    all shapes.
+    """
+    if body.shapes is None:
+        return None
+    length, has_twist = body.shapes.length, "twist1" in body.modes
+    sections, length_ratio = body.shapes.sections(x), max(line / length, 1.0)
+    from_held = x - held
+    sides = [
+        (from_held * distance > 0, abs(distance)) for distance in _distances_to_ends(length, held)
+    ]
+
+    def largest(load: Array, stiffness: Array) -> float:
+        return max(
+            _max_work_ratio(
+                load[:, side], stiffness[side], np.abs(from_held[side]), weights[side], distance
+            )
+            for side, distance in sides
+        )
+
+    ratios = []
+    for plane, compliant, stiff, component in (
+        ("z", sections.EI_y, sections.EI_z, 2), ("y", sections.EI_z, sections.EI_y, 1),
+    ):  # fmt: skip
+        if np.min(compliant) <= 0 or (has_bending_shapes(body, plane) and has_twist):
+            continue
+        if not has_bending_shapes(body, plane):
+            ratios.append(length_ratio**2 * largest(-force[..., 0], compliant))
+        if np.min(sections.GI_t) > 0:
+            share = np.maximum(1 - compliant / stiff, 0.0)  # as soft in its plane it just bends
+            square = share * moment[..., component] ** 2 / compliant
+            ratios.append(length_ratio * np.sqrt(largest(square, sections.GI_t)))
+    return max(ratios, default=None)
+
+
+def _max_work_ratio(
+    load: Array, stiffness: Array, x: Array, weights: Array, length: float
+) -> float:
+    """Largest int load phi^2 / int stiffness phi'^2 over all samples of `load` (n, m), at least 0;
+    phi = 0 at x = 0, and free at x = length."""
+    wave_numbers = (np.arange(_QUARTER_WAVES) + 0.5) * np.pi / length
+    phi, rate = (
+        np.sin(np.outer(wave_numbers, x)),
+        wave_numbers[:, None] * np.cos(np.outer(wave_numbers, x)),
+    )
+    rate *= np.sqrt(stiffness * weights)
+    phi = np.linalg.solve(np.linalg.cholesky(rate @ rate.T), phi)
+    work = np.einsum("im,nm,jm->nij", phi, load * weights, phi, optimize=True)
+    if not np.isfinite(work).all():
+        return 0.0
+    return float(np.max(np.linalg.eigvalsh(work), initial=0.0))

@@ -1,0 +1,337 @@
+"""Validity range of flexible bodies: how far a run stayed within it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+from mstmm.scene.checks.welded_beams import beam_lines
+
+from ...flexible.memory_chunks import slices
+from ...flexible.modal_scales import radius_of_gyration
+from . import range_estimators as e
+from .lateral_buckling import lateral_load_ratio, quadrature_rule
+from .modal_energy import modal_energy, modal_frequencies, strain_energy
+from .modal_participation import participation_by_body
+from .motion import elastic_moment, tilde
+from .section_loads import section_loads
+
+if TYPE_CHECKING:
+    from .body_motions import FlexibleBodies
+    from .motion import Motion
+
+
+#: Samples that are looked at, and flexible bodies of a scene.
+MAX_SAMPLES, MAX_BODIES = 160, 400
+
+#: Slopes below this are rounding: what bends so little is not judged by its shapes.
+_ZERO_SLOPE = 1e-9
+
+#: Coordinates, rates and accelerations that are judged are below this.
+_MAX_MAGNITUDE = 1e50
+
+
+@dataclass(frozen=True)
+class ModelRange:
+    """How far one flexible body went, over the samples of a run.
+
+    Attributes:
+        name, modes, frame: of the body.
+        stiffening: second-order displacements are in its kinematics.
+        slope: kappa, the largest slope against its floating frame; the frame's own error is up to
+            kappa^2 / 2.
+        turn: rad, largest rotation of a section against the frame, twist included.
+        first_frequency: rad/s of its shapes, the frame at rest.
+        spin_ratio: largest spin across the body over its first frequency.
+        gamma: (smallest, largest) eigenvalue of K^-1 K_g of the loads; None if not known.
+        last_share: largest share of the energy that the last shape of a family held, which one.
+        tail: part of the bending energy of the true section loads that the shapes miss, of an
+            elastic body of the deflection of its ends; None where it is not known.
+        coupling: share chi of the inertia at its hinge that the mode with the most energy holds,
+            and this mode.
+        shear: largest error of a bending frequency without shear (and rotary inertia), times the
+            share of the energy that its shape holds; None where the section's radius of gyration is
+            not known.
+        strain: largest strain of its axis and, where the radius of gyration is known, of its
+            outermost fibres; None where it has no length.
+        sideways: loads over those that can buckle a beam in a way for which it has no shapes; None
+            where it has all shapes.
+        said: what is known of the body's model before it moves, and a way out, one sentence each.
+        one_way: it responds to a rigid run, linearly, and is no part of it.
+        tail_of: what `tail` is a part of.
+        unmoved_frame: the frame that deflections count from with fewer shapes, where it is another.
+    """
+
+    name: str
+    modes: int
+    frame: str
+    stiffening: bool
+    slope: float
+    turn: float
+    first_frequency: float
+    spin_ratio: float
+    gamma: tuple[float, float] | None
+    last_share: tuple[float, str] | None
+    tail: float | None
+    coupling: tuple[float, str] | None
+    shear: float | None
+    strain: float | None = None
+    sideways: float | None = None
+    said: tuple[str, ...] = ()
+    one_way: bool = False
+    tail_of: str = e.BENDING_ENERGY
+    unmoved_frame: str = ""
+
+    @property
+    def frame_error(self) -> float:
+        """kappa^2 / 2, at most 1: what one frame may err by, as a part of the deflection."""
+        return min(self.slope * self.slope / 2, 1.0)  # ** raises where this is infinite
+
+    @property
+    def shortening_error(self) -> float:
+        """kappa^2: the same as a part of how far a bent body shortens, which goes with the square
+        of its deflection and so errs by twice as much."""
+        return self.slope * self.slope
+
+    @property
+    def load_ratio(self) -> float:
+        """gamma: the larger of the two ratios in size."""
+        return 0.0 if self.gamma is None else max(abs(x) for x in self.gamma)
+
+
+def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
+    """One entry per flexible body; none for runs without samples and for very many bodies."""
+    if not len(flexible.run.t) or not 0 < len(flexible.known) <= MAX_BODIES:
+        return ()
+    shares = participation_by_body(flexible)
+    welded_lines = beam_lines(flexible.model.scene)
+    return tuple(
+        _model_range(
+            flexible,
+            name,
+            shares.get(name),
+            welded_lines[name].length if name in welded_lines else None,
+        )
+        for name in flexible.known
+    )
+
+
+def _model_range(
+    flexible: FlexibleBodies, name: str, coupling: Array | None, line: float | None
+) -> ModelRange:
+    full_motion = flexible.motion(name)
+    body, finite = full_motion.body, _is_squarable(full_motion.eta)
+    finite_motion = full_motion.some(
+        finite
+    )  # also where the rest of the motion cannot be evaluated
+    finite &= (
+        _is_squarable(full_motion.etad)
+        & _is_squarable(full_motion.etadd)
+        & _is_squarable(full_motion.acceleration)
+    )
+    valid_samples = np.flatnonzero(finite)
+    energies = strain_energy(full_motion.some(valid_samples))
+    picked_indices = np.unique(
+        np.linspace(0, len(valid_samples) - 1, min(MAX_SAMPLES, len(valid_samples))).astype(int)
+    )
+    picked_indices = (
+        np.union1d(picked_indices, [int(np.argmax(energies))])
+        if len(valid_samples)
+        else picked_indices
+    )
+    motion, samples = full_motion.some(valid_samples), valid_samples[picked_indices]
+    slope, shapes = e.max_slope(finite_motion), body.shapes
+    first_frequency = float(modal_frequencies(body)[0])
+    has_section_loads = shapes is not None and name not in flexible.unbalanced
+    tail, lateral_load_ratio = (
+        _section_estimates(flexible, name, samples, line) if has_section_loads else (None, None)
+    )
+    if body.truncation is not None and name not in flexible.unbalanced:
+        tail = missed_deflection(flexible, name, samples)
+    return ModelRange(
+        name,
+        len(body.modes),
+        body.frame,
+        e.has_second_order_terms(body) and name not in flexible.one_way,
+        slope,
+        e.max_rotation(finite_motion),
+        first_frequency,
+        e.transverse_spin(motion) / first_frequency if first_frequency > 0 else 0.0,
+        _load_ratio_bounds(flexible, name, samples),
+        e.last_shape_share(motion) if slope > _ZERO_SLOPE else None,
+        tail if slope > _ZERO_SLOPE else None,
+        _leading_coupling(motion, coupling),
+        e.weighted_shear_error(motion, line),
+        e.max_strain(finite_motion),
+        lateral_load_ratio,
+        body.warnings,
+        name in flexible.one_way,
+        e.BENDING_ENERGY if shapes else e.DEFLECTION,
+        body.unmoved_frame,
+    )
+
+
+def _is_squarable(numbers: Array) -> NDArray[np.bool_]:
+    """(n,) where squares of squares of numbers (n, k) are numbers: what runs away grows beyond that
+    and has long said so."""
+    return np.asarray((np.abs(numbers) < _MAX_MAGNITUDE).all(axis=1))
+
+
+def _leading_coupling(motion: Motion, coupling: Array | None) -> tuple[float, str] | None:
+    """chi of the mode that held the most energy."""
+    if coupling is None or not len(motion.t):
+        return None
+    k = int(np.argmax(modal_energy(motion).max(axis=0)))
+    return float(coupling[k]), motion.body.modes[k]
+
+
+def _load_ratio_bounds(
+    flexible: FlexibleBodies, name: str, some: NDArray[np.int64]
+) -> tuple[float, float] | None:
+    """Load ratios; of a linear beam by the shortening that it leaves out."""
+    motion, loads = flexible.motion(name), flexible.end_loads(name)
+    second_order_moments = e.second_order_moments(motion.body)
+    if second_order_moments is None or not len(some):
+        return None
+    ratios = []
+    try:
+        for part in (some[k] for k in slices(len(some), 4 * motion.body.n**2)):
+            end_loads = {
+                port: (force[part], moment[part]) for port, (force, moment) in loads.items()
+            }
+            k_g = e.stiffness_from_loads(
+                motion.some(part), flexible.gravity, end_loads, second_order_moments
+            )
+            ratios.append(e.load_ratios(motion.body.K, k_g))
+    except np.linalg.LinAlgError:  # loads beyond what numbers hold
+        return None
+    lowest, highest = zip(*ratios, strict=True)
+    return min(lowest), max(highest)
+
+
+def _section_estimates(
+    flexible: FlexibleBodies, name: str, some: NDArray[np.int64], line: float | None
+) -> tuple[float | None, float | None]:
+    """What the true loads of a beam's sections tell: bending energy of the difference of their
+    moments and those of the shapes, over that of the former; and `lateral_load_ratio`."""
+    motion = flexible.motion(name).some(some)
+    if not len(some):
+        return None, None
+    inboard_x = flexible.held_place(name)
+    x, weights = quadrature_rule(motion.shapes, inboard_x)
+    points = [p.some(some) for p in flexible.point_loads(name)]
+    lines = [line.some(some) for line in flexible.line_loads(name)]
+    force, moment = section_loads(motion, x, flexible.gravity, inboard_x, points, lines)
+    length = motion.shapes.length if line is None else line
+    return (
+        missed_bending_energy(motion, x, weights, moment[:, :, 1:]),
+        lateral_load_ratio(motion.body, x, weights, inboard_x, length, force, moment),
+    )
+
+
+def missed_bending_energy(
+    motion: Motion, places: Array, weights: Array, moment: Array
+) -> float | None:
+    """Part of the bending energy of `moment` (n, m, 2) that the shapes miss when they are bent
+    most (just after a load was switched on they have not yet followed); None without any."""
+    shapes = motion.shapes
+    sections = shapes.sections(places)
+    compliance = weights[:, None] / np.stack([sections.EI_y, sections.EI_z], axis=1)
+    bends = np.array(
+        [e.has_bending_shapes(motion.body, "z"), e.has_bending_shapes(motion.body, "y")]
+    )
+    compliance = np.where(bends, compliance, 0.0)
+    shape_moment = elastic_moment(motion, places)
+    true_energy, shape_energy, missed_energy = (
+        np.einsum("tma,ma->t", m**2, compliance)
+        for m in (moment, shape_moment, moment - shape_moment)
+    )
+    k = int(np.argmax(shape_energy))
+    return float(missed_energy[k] / true_energy[k]) if true_energy[k] > 0 else None
+
+
+def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:
+    """Part of the deflection of an elastic body's ends, under what they carry, its spin and the
+    inertia of its shapes, that the shapes miss when they are strained most; None without any."""
+    motion = flexible.motion(name).some(some)
+    truncation, inboard_end = motion.body.truncation, flexible.held_end(name)
+    energies = strain_energy(motion)
+    if truncation is None or not len(some) or not energies.max() > 0:
+        return None
+    loads = flexible.end_loads(name) | {inboard_end: flexible.held_load(name)}
+    zero = np.zeros((len(some), 3))
+    inputs = []
+    for port in truncation.ports:
+        force, moment = (part[some] for part in loads[port]) if port in loads else (zero, zero)
+        inputs += [motion.inward(force), motion.inward(moment)]
+    spin = tilde(motion.frame_spin)
+    frame_rotation_rate = tilde(motion.frame_spin_rate) + spin @ spin
+    inputs += [-np.swapaxes(frame_rotation_rate, 1, 2).reshape(-1, 9), motion.etadd]
+    length = radius_of_gyration(motion.body)
+    missed = truncation.missed(np.concatenate(inputs, axis=1), length)
+    return float(missed[int(np.argmax(energies))])
+
+
+# --- rows -----------------------------------------------------------------------------------------
+
+#: Bodies that get rows of their own in the certificate; of more only the extremes are shown.
+_MAX_BODY_ROWS = 4
+
+
+def rows(found: Sequence[ModelRange]) -> list[tuple[str, str]]:
+    """Lines of the certificate, (name, text)."""
+    if len(found) <= _MAX_BODY_ROWS:
+        return [row for body_range in found for row in _body_rows(body_range)]
+    steepest = max(found, key=lambda body_range: body_range.slope)
+    fastest = max(found, key=lambda body_range: body_range.spin_ratio)
+    loaded = max(found, key=lambda body_range: body_range.load_ratio)
+    strains = [body_range for body_range in found if body_range.strain is not None]
+    parts = [
+        ("largest slope", f'{steepest.slope:.2g} at "{steepest.name}"'),
+        ("largest spin ratio", f'{fastest.spin_ratio:.2g} at "{fastest.name}"'),
+        ("largest load ratio", f'{loaded.load_ratio:.2g} at "{loaded.name}"'),
+    ]
+    if strains:
+        worst = max(strains, key=lambda body_range: body_range.strain or 0.0)
+        parts.append(("largest strain", f'{worst.strain:.1e} at "{worst.name}"'))
+    tails = [body_range for body_range in found if body_range.tail is not None]
+    if tails:
+        worst = max(tails, key=lambda body_range: body_range.tail or 0.0)
+        parts.append(("bending missed", f'{worst.tail:.1e} at "{worst.name}"'))
+    return parts
+
+
+def _body_rows(one: ModelRange) -> list[tuple[str, str]]:
+    motion_parts = [
+        f"slope {one.slope:.2g} (the frame errs by up to {one.frame_error:.0e} of the deflection, "
+        f"{one.shortening_error:.0e} of the shortening)"
+    ]
+    if one.strain is not None:
+        motion_parts.append(f"strain {one.strain:.1e}")
+    motion_parts.append(f"spin {one.spin_ratio:.2g} of omega_1 = {one.first_frequency:.4g} rad/s")
+    if one.gamma is not None:
+        low, high = one.gamma
+        worst = high if high >= -low else low
+        change = "stiffened" if worst >= 0 else "softened"
+        change = f"not {change}" if one.one_way else change
+        motion_parts.append(f"{change} by loads {abs(worst):.2g} (gamma)")
+    shape_parts = [f"{one.modes} in a {one.frame} frame" if one.frame else f"{one.modes}"]
+    if one.unmoved_frame:
+        shape_parts[0] += f" ({one.unmoved_frame} with fewer shapes)"
+    if one.last_share is not None and one.last_share[1]:
+        shape_parts.append(f"{one.last_share[1]} holds {one.last_share[0]:.1e} of the energy")
+    if one.tail is not None:
+        shape_parts.append(f"{one.tail:.1e} of the {one.tail_of} missed")
+    if one.coupling is not None:
+        shape_parts.append(f"coupling {one.coupling[0]:.2g} ({one.coupling[1]})")
+    if one.shear is not None:
+        shape_parts.append(f"shear {one.shear:.0e}")
+    return [
+        (f"{one.name}", "; ".join(motion_parts)),
+        (f"{one.name} shapes", "; ".join(shape_parts)),
+    ]

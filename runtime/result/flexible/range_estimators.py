@@ -1,0 +1,255 @@
+"""Estimators of how far a flexible body left the validity range of its model.
+
+Per body: slope kappa, spin ratio, stiffening gamma, share of the last shape, bending that the
+shapes could not follow, coupling chi, shear.  Thresholds and reasons stand beside the numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from ...flexible.beam.beam_integrals import second_moments
+from .modal_energy import modal_energy
+from .motion import Motion, rotation_vectors, tilde, values_at
+
+if TYPE_CHECKING:
+    from ...flexible.beam.section_ports import BeamShapes
+    from ...flexible.modal_body import ModalBody
+
+
+#: What the part that shapes miss is a part of: of a beam, and of an elastic body.
+BENDING_ENERGY, DEFLECTION = "bending energy", "deflection of its ends"
+
+#: Sections of a beam that are looked at.
+SECTION_COUNT = 33
+
+
+def max_slope(motion: Motion) -> float:
+    """kappa = max |phi' eta|: slope of the deflected axis against the frame; of an elastic body the
+    largest rotation of an end across its frame."""
+    return max((float(np.max(np.hypot(t[..., 1], t[..., 2]), initial=0.0))
+                for t in _rotation_vectors(motion)), default=0.0)  # fmt: skip
+
+
+def max_rotation(motion: Motion) -> float:
+    """max |Psi| in rad of a section or an end against the frame, twist included."""
+    return max((float(np.max(np.linalg.norm(t, axis=-1), initial=0.0))
+                for t in _rotation_vectors(motion)), default=0.0)  # fmt: skip
+
+
+def _rotation_vectors(motion: Motion) -> list[Array]:
+    """Rotation vectors (n, m, 3) of sections along a beam, or of the ends of an elastic body."""
+    body = motion.body
+    if body.shapes is not None:
+        places = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
+        return [rotation_vectors(motion, places)]
+    return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
+
+
+def has_second_order_terms(body: ModalBody) -> bool:
+    """Whether second-order displacements are in a body's kinematics."""
+    return bool(np.any(body.G)) if body.shapes is None else bool(body.shapes.stiffening)
+
+
+def transverse_spin(motion: Motion) -> float:
+    """Largest spin in rad/s of the frame about what lies across a beam; about any axis else.
+
+    Spin about a beam's own axis neither stretches nor bends it.
+    """
+    first = 1 if motion.body.shapes is not None else 0
+    return float(np.max(np.linalg.norm(motion.frame_spin[:, first:], axis=1), initial=0.0))
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """Moments of the second-order displacement: G (3, n, n) = int rho g_a, X (3, 3, n, n) =
+    int rho r0_a g_b; displacement and rotation of second order (6, n, n) at the ends."""
+
+    G: Array
+    X: Array
+    ends: dict[str, Array]
+
+
+def second_order_moments(body: ModalBody) -> SecondOrder | None:
+    """Of a beam what bending and twist bring, also where its kinematics leave it out; of another
+    body what it has; None if it has nothing."""
+    if body.shapes is None or body.shapes.stiffening:
+        ends = {name: port.second_order for name, port in body.ports.items()}
+        has_terms = np.any(body.G) or any(np.any(g) for g in ends.values())
+        return SecondOrder(body.G, body.X, ends) if has_terms or body.shapes is not None else None
+    x, weights = body.shapes.rule()
+    density = body.shapes.data.inertia[:, body.shapes.data.piece(x)]
+    end_positions = np.array([port.position[0] for port in body.ports.values()])
+    at_ends = body.shapes.second_order.at(end_positions)
+    return SecondOrder(
+        *second_moments(body.shapes, density, x, weights),
+        dict(zip(body.ports, at_ends, strict=True)),
+    )
+
+
+def stiffness_from_loads(
+    motion: Motion, gravity: Array, ports: dict[str, tuple[Array, Array]], second: SecondOrder
+) -> Array:
+    """(n, modes, modes) K_g of the loads on the undeformed body.
+
+    K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port) + M_a h_a(port), with the acceleration
+    a = a_o + W r0 of the rigid motion, W = wd~ + w~ w~, and g, h the displacement and rotation of
+    second order: for a beam (w_y^2 + w_z^2) G1 - a_x G0 + (end load, as a tension) G(L), and the
+    work of loads across it on its twist.  `ports` are forces in N and moments in N*m (n, 3) on the
+    ends, inertial axes.
+    """
+    force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
+    spin = tilde(motion.frame_spin)
+    frame_rotation_rate = tilde(motion.frame_spin_rate) + spin @ spin
+    total = -np.tensordot(force, second.G, axes=1)
+    total -= np.tensordot(frame_rotation_rate, second.X, axes=((1, 2), (1, 0)))
+    for name, loads in ports.items():
+        wrench = np.concatenate([motion.inward(load) for load in loads], axis=1)
+        total += np.tensordot(wrench, second.ends[name], axes=1)
+    return np.asarray(total)
+
+
+def load_ratios(stiffness: Array, from_loads: Array) -> tuple[float, float]:
+    """(smallest, largest) eigenvalue of K^-1 K_g over the samples.
+
+    gamma is the larger of the two in size; at -1 the loads alone buckle the body.
+    """
+    whitened = np.linalg.inv(np.linalg.cholesky(stiffness))
+    whitened_loads = whitened @ from_loads @ whitened.T
+    values = np.linalg.eigvalsh((whitened_loads + np.swapaxes(whitened_loads, -1, -2)) / 2)
+    return float(values.min(initial=0.0)), float(values.max(initial=0.0))
+
+
+def last_shape_share(motion: Motion) -> tuple[float, str]:
+    """Largest share of the energy of all modes that a family's last shape held, and its name.
+
+    Families are the mode names without their number: y, z, twist, axial.  A family that holds less
+    than a thousandth of the energy throughout does not count, nor one with a single shape.
+    """
+    energy = modal_energy(motion)
+    total = float(np.max(energy.sum(axis=1), initial=0.0))
+    families: dict[str, list[int]] = {}
+    for k, name in enumerate(motion.body.modes):
+        families.setdefault(name.rstrip("0123456789"), []).append(k)
+    worst = (0.0, "")
+    for members in families.values():
+        family_energy = float(np.max(energy[:, members].sum(axis=1), initial=0.0))
+        if len(members) < 2 or total <= 0 or family_energy < 1e-3 * total:
+            continue
+        share = float(np.max(energy[:, members[-1]], initial=0.0)) / family_energy
+        worst = max(worst, (share, motion.body.modes[members[-1]]))
+    return worst
+
+
+def has_bending_shapes(body: ModalBody, plane: str) -> bool:
+    """Whether a beam has shapes of deflection along y or z."""
+    return any(name.startswith(plane) for name in body.modes)
+
+
+def gyration_radii(shapes: BeamShapes, x: Array) -> Array:
+    """(3, m) radii of gyration in m of the sections at x, about their y and z axes in rows 1 and 2;
+    zero where they are not known.
+
+    From rotary inertia, else from E I / E A, else from half the polar inertia.
+    """
+    s = shapes.sections(x)
+    radii = np.sqrt(s.rho_I / s.mass_per_length)
+    if not shapes.data.rotary:
+        for row, bending in ((1, s.EI_y), (2, s.EI_z)):
+            has_axial_stiffness = s.EA > 0
+            radii[row, has_axial_stiffness] = np.sqrt(
+                bending[has_axial_stiffness] / s.EA[has_axial_stiffness]
+            )
+    return np.asarray(radii)
+
+
+def max_strain(motion: Motion) -> float | None:
+    """Largest strain of a beam: |s'| of its axis, and of the outermost fibre sqrt(3) r |curvature|
+    where the radius of gyration r is known, as of a rectangle.
+
+    Of another body the stretch of the lines between its ends, over their lengths.  None where
+    neither is known.
+    """
+    body = motion.body
+    if body.shapes is None:
+        return _max_line_stretch(motion)
+    x = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
+    values, radii = values_at(body.shapes, x), gyration_radii(body.shapes, x)
+    if not values.stretch.any() and not radii[1:].any():
+        return None
+    strain = np.abs(np.einsum("mk,tk->tm", values.stretch, motion.eta))
+    for row in (1, 2):
+        curvature = np.einsum("mk,tk->tm", values.curvature[:, row], motion.eta)
+        strain += np.sqrt(3.0) * radii[row] * np.abs(curvature)
+    return float(np.max(strain, initial=0.0))
+
+
+def _max_line_stretch(motion: Motion) -> float | None:
+    """Largest change of the distance of two ends along their line at rest, over that distance."""
+    stretches = []
+    for a, b in combinations(motion.body.ports.values(), 2):
+        line = b.position - a.position
+        square = float(line @ line)
+        if square > 0:
+            stretch = np.einsum("a,ak,tk->t", line, b.phi - a.phi, motion.eta) / square
+            stretches.append(float(np.max(np.abs(stretch), initial=0.0)))
+    return max(stretches, default=None)
+
+
+def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
+    """(n,) relative error of the frequency of each bending shape of a beam for want of shear (and
+    of rotary inertia where the model has none), 0 of others; None where the section's radius of
+    gyration is not known.
+
+    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the shape in
+    1/m, r the radius of gyration in m; the 1 is rotary inertia.  `line` (m) is the length of the
+    beams that are welded in line with it: as many shapes are judged on all of that.
+    """
+    shapes = body.shapes
+    if shapes is None:
+        return None
+    x, weights = shapes.rule()
+    errors, is_known = np.zeros(body.n), False
+    for plane, axis in (("y", 2), ("z", 1)):
+        mode_indices = [k for k, name in enumerate(body.modes) if name.startswith(plane)]
+        gyration = float(np.max(gyration_radii(shapes, x)[axis]))
+        if not mode_indices or not gyration > 0:
+            continue
+        phi, bending = (
+            values_at(shapes, x).phi[:, "xyz".index(plane)],
+            values_at(shapes, x).curvature[:, axis],
+        )
+        squares = (weights @ bending[:, mode_indices] ** 2) / (weights @ phi[:, mode_indices] ** 2)
+        wave_number_squared = np.sqrt(squares)  # int phi''^2 / int phi^2 = beta^4
+        wave_number_squared *= (shapes.length / line) ** 2 if line else 1.0
+        errors[mode_indices] = (
+            0.5 * wave_number_squared * gyration**2 * (_SHEAR_RATIO + float(not shapes.data.rotary))
+        )
+        is_known = True
+    return errors if is_known else None
+
+
+def weighted_shear_error(motion: Motion, line: float | None = None) -> float | None:
+    """The largest of them, each times the share of the body's energy that its shape holds where it
+    holds most: what does not move errs by nothing."""
+    errors = shear_errors(motion.body, line)
+    if errors is None or not len(motion.t):
+        return errors if errors is None else 0.0
+    energies = modal_energy(motion)
+    max_energy = float(energies.sum(axis=1).max())
+    shares = (
+        np.clip(energies.max(axis=0) / max_energy, 0.0, 1.0)
+        if max_energy > 0
+        else np.zeros(motion.body.n)
+    )
+    return float(np.max(shares * errors))
+
+
+#: E / (k G) of a rectangular section, nu = 0.3, k = 5/6.
+_SHEAR_RATIO = 2 * (1 + 0.3) * 6 / 5

@@ -1,0 +1,266 @@
+"""Loads within a beam from equilibrium: what holds the part beyond a section in its motion.
+
+The part of the beam between a section and the side that is not held feels its inertia, gravity,
+distributed loads, drag, what hangs on its ends, and the load of the rest of the beam, by which all
+this is balanced (d'Alembert).  Unlike EI v'', which sees only the curvature that the shapes can
+take, this contains what the shapes cannot bend for: concentrated loads, and the axial force of an
+axis that does not stretch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from .motion import (
+    Motion,
+    deflection,
+    first_order_field,
+    rotation_vectors,
+    second_order_motion,
+    section_rotations,
+    tilde,
+    values_at,
+)
+
+#: Gauss points of a panel and fewest panels of a beam: exact for products of cubics at a panel's
+#: size, and fine enough for the shapes that can be told apart.
+_GAUSS_POINTS, _MIN_PANELS = 5, 8
+
+#: Numbers of one batch of samples, about 30 MB an array.
+_MAX_BATCH_NUMBERS = 2**22
+
+
+@dataclass(frozen=True)
+class PointLoad:
+    """What acts on the beam at x (m): force (n, 3) N and moment (n, 3) N*m about the axis point
+    there, inertial axes."""
+
+    x: float
+    force: Array
+    moment: Array
+
+    def some(self, samples: Any) -> PointLoad:
+        """The same at some samples."""
+        return PointLoad(self.x, self.force[samples], self.moment[samples])
+
+
+@dataclass(frozen=True)
+class LineLoad:
+    """Force (n, 3) N and moment (n, 3) N*m, spread evenly from x = first to last (m), inertial
+    axes."""
+
+    first: float
+    last: float
+    force: Array
+    moment: Array
+
+    def some(self, samples: Any) -> LineLoad:
+        """The same at some samples."""
+        return LineLoad(self.first, self.last, self.force[samples], self.moment[samples])
+
+
+def section_loads(
+    motion: Motion,
+    places: Array,
+    gravity: Array,
+    held: float,
+    points: Sequence[PointLoad] = (),
+    lines: Sequence[LineLoad] = (),
+) -> tuple[Array, Array]:
+    """Force (n, m, 3) in N and moment (n, m, 3) in N*m of the part beyond x on the part before it.
+
+    In the axes of the section, turned with it: axial force (tension positive) and shear along y
+    and z; torque and bending moments about y and z.  Moments are about the deflected axis.
+    `gravity` in m/s2, inertial axes.  `held` is the x of the section through which the beam hangs
+    on the tree: loads there are not needed, because the free side is added up.  Where a load stands
+    at x itself, the values are those on the held side of it.
+    """
+    edges = _panel_edges(motion, places, points, lines)
+    rows = max(1, _MAX_BATCH_NUMBERS // (3 * _GAUSS_POINTS * len(edges)))
+    force, moment = (np.empty((len(motion.t), len(places), 3)) for _ in range(2))
+    for first in range(0, len(motion.t), rows):
+        samples = slice(first, first + rows)
+        sampled_points, sampled_lines = (
+            [p.some(samples) for p in points],
+            [p.some(samples) for p in lines],
+        )
+        sums = _PanelSums(motion.some(samples), edges, gravity, sampled_points, sampled_lines)
+        force[samples], moment[samples] = sums.at(places, held)
+    return force, moment
+
+
+def _panel_edges(
+    motion: Motion, places: Array, points: Sequence[PointLoad], lines: Sequence[LineLoad]
+) -> Array:
+    """Ends of the panels: nothing jumps within one."""
+    shapes = motion.shapes
+    count = max(_MIN_PANELS, 2 * motion.eta.shape[1])
+    positions = [np.linspace(0.0, shapes.length, count + 1), places, np.asarray(shapes.pieces)]
+    positions += [np.array([p.x]) for p in points]
+    positions += [np.array([p.first, p.last]) for p in lines]
+    return np.unique(np.clip(np.concatenate(positions), 0.0, shapes.length))
+
+
+class _PanelSums:
+    """Sums of loads per panel, frame axes, moments about the frame's origin."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        edges: Array,
+        gravity: Array,
+        points: Sequence[PointLoad],
+        lines: Sequence[LineLoad],
+    ) -> None:
+        self.motion, self.edges = motion, edges
+        nodes, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+        half = np.diff(edges) / 2
+        x = (edges[:-1, None] + half[:, None] * (1 + nodes)).ravel()
+        self.weights = (half[:, None] * weights).ravel()
+        position, force, moment = _load_densities(motion, x, gravity)
+        for line in lines:
+            share = ((x > line.first) & (x < line.last)) / max(line.last - line.first, 1e-300)
+            force = force + motion.inward(line.force)[:, None] * share[:, None]
+            moment = moment + motion.inward(line.moment)[:, None] * share[:, None]
+        moment = moment + np.cross(position, force)
+        self.panels = np.concatenate([self._per_panel(force), self._per_panel(moment)], axis=2)
+        self.points = [(p.x, self._wrench(p)) for p in points]
+
+    def _per_panel(self, density: Array) -> Array:
+        weighted = density * self.weights[:, None]
+        return weighted.reshape(len(density), -1, _GAUSS_POINTS, 3).sum(axis=2)
+
+    def _wrench(self, load: PointLoad) -> Array:
+        """(n, 6) of a load, about the frame's origin."""
+        force, moment = self.motion.inward(load.force), self.motion.inward(load.moment)
+        position = _deflected_positions(self.motion, np.array([load.x]))[:, 0]
+        return np.concatenate([force, moment + np.cross(position, force)], axis=1)
+
+    def at(self, places: Array, held: float) -> tuple[Array, Array]:
+        """Force and moment at the sections, section axes."""
+        zero = np.zeros((len(self.panels), 1, 6))
+        inboard_sums = np.concatenate([zero, np.cumsum(self.panels, axis=1)], axis=1)
+        outboard_sums = np.concatenate(
+            [np.cumsum(self.panels[:, ::-1], axis=1)[:, ::-1], zero], axis=1
+        )
+        edge_indices = np.searchsorted(self.edges, places)
+        # At the section itself the part beyond is that on the outer side, which a held tip has not.
+        outer = places >= held if held < self.motion.shapes.length else places > held
+        total = np.where(
+            outer[:, None], outboard_sums[:, edge_indices], -inboard_sums[:, edge_indices]
+        )
+        for x, wrench in self.points:
+            is_beyond = outer & (x >= places) & (x != held)
+            is_below = ~outer & (x <= places) & (x != held)
+            total = total + wrench[:, None] * (is_beyond.astype(float) - is_below)[:, None]
+        force = total[:, :, :3]
+        moment = total[:, :, 3:] - np.cross(_deflected_positions(self.motion, places), force)
+        rotations = section_rotations(rotation_vectors(self.motion, places))
+        return np.einsum("tmji,tmj->tmi", rotations, force), np.einsum(
+            "tmji,tmj->tmi", rotations, moment
+        )
+
+
+def _deflected_positions(motion: Motion, x: Array) -> Array:
+    """(n, m, 3) places of the deflected axis, frame axes."""
+    at_rest = np.zeros((len(x), 3))
+    at_rest[:, 0] = x
+    return at_rest + deflection(motion, x)
+
+
+def _second_order_terms(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
+    """Displacement and rotation (n, m, 6) of second order of the sections and their two rates; the
+    rotation is that of the sections' inertia, which of slices that are rigid bodies of their own is
+    all of it."""
+    is_for_inertia = not motion.body.points
+    pairs = [("eta", "eta"), ("eta", "etad"), ("eta", "etadd"), ("etad", "etad")]
+    value, rate, eta_etadd, etad_etad = (
+        second_order_motion(motion, x, a, b, is_for_inertia) for a, b in pairs
+    )
+    return -0.5 * value, -rate, -(eta_etadd + etad_etad)
+
+
+def _load_densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
+    """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
+    body, shapes, values = motion.body, motion.shapes, values_at(motion.shapes, x)
+    sections = shapes.sections(x)
+    second = _second_order_terms(motion, x)
+    position, relative_velocity, relative_acceleration = (
+        first_order_field(values.phi, modal) + term[..., :3]
+        for modal, term in zip((motion.eta, motion.etad, motion.etadd), second, strict=True)
+    )
+    position[..., 0] += x
+    w = motion.frame_spin[:, None]
+    wd = motion.frame_spin_rate[:, None]
+    frame_velocity = np.cross(w, position)
+    acceleration = (
+        motion.frame_acceleration[:, None] + np.cross(wd, position) + np.cross(w, frame_velocity)
+    )
+    acceleration += 2 * np.cross(w, relative_velocity) + relative_acceleration
+    weight = motion.inward(np.broadcast_to(gravity, motion.velocity.shape))[:, None]
+    density = weight - acceleration
+    force = density * sections.mass_per_length[:, None]
+    if body.drag is not None:
+        drag = sections.drag[:, None]
+        force -= drag * (motion.frame_velocity[:, None] + frame_velocity + relative_velocity)
+    rotations = [term[..., 3:] for term in second]
+    return (
+        position,
+        force,
+        -_rotary_inertia_moment(motion, x, values.theta, rotations, sections.rho_I.T),
+    )
+
+
+def _rotary_inertia_moment(
+    motion: Motion, x: Array, theta: Array, turned: Sequence[Array], per_length: Array
+) -> Array:
+    """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
+
+    A point s of a section lies at B s from the axis, B = exp(Psi~) to second order with the part of
+    Psi that turns the sections' inertia (twist alone without rotary inertia), and is accelerated by
+    Q s, Q = (wd~ + w~ w~) B + 2 w~ Bd + Bdd; so int rho (B s) x (Q s) is the axial vector of
+    B (int rho s s^T) Q^T.  Slices that are rigid bodies of their own turn with all of Psi.
+    """
+    if not per_length.any():
+        return np.zeros((len(motion.t), len(per_length), 3))
+    if not motion.body.points:
+        rows = motion.shapes.rows
+        theta = np.moveaxis(motion.shapes.carried(rows(x, 1), rows(x, 0)[3]), 2, 0)
+    rotation, rate, growth = _section_rotation(motion, theta, turned)
+    w = tilde(motion.frame_spin)[:, None]
+    acceleration = (
+        (tilde(motion.frame_spin_rate)[:, None] + w @ w) @ rotation + 2 * w @ rate + growth
+    )
+    second = np.zeros((len(x), 3, 3))
+    second[:, 1, 1], second[:, 2, 2] = per_length[:, 2], per_length[:, 1]
+    product = rotation @ second @ np.swapaxes(acceleration, -1, -2)
+    axial = [product[..., a, b] - product[..., b, a] for a, b in ((1, 2), (2, 0), (0, 1))]
+    return np.stack(axial, axis=-1)
+
+
+def _section_rotation(
+    motion: Motion, theta: Array, turned: Sequence[Array]
+) -> tuple[Array, Array, Array]:
+    """B = 1 + Psi~ + Psi~ Psi~ / 2 of the sections' inertia and its two rates, (n, m, 3, 3), from
+    the rotation (m, 3, modes) of first order and that of second order with its rates (n, m, 3)."""
+    skew, skew_rate, skew_acceleration = (
+        tilde(first_order_field(theta, modal)) for modal in (motion.eta, motion.etad, motion.etadd)
+    )
+    if not motion.shapes.stiffening:
+        return np.eye(3) + skew, skew_rate, skew_acceleration
+    mixed_product = skew @ skew_rate
+    acceleration_product = skew @ skew_acceleration + skew_rate @ skew_rate
+    second_order_skew, second_order_rate, second_order_acceleration = map(tilde, turned)
+    return (
+        np.eye(3) + skew + second_order_skew + skew @ skew / 2,
+        skew_rate + second_order_rate + (mixed_product + np.swapaxes(mixed_product, -1, -2)) / 2,
+        skew_acceleration
+        + second_order_acceleration
+        + (acceleration_product + np.swapaxes(acceleration_product, -1, -2)) / 2,
+    )

@@ -1,0 +1,122 @@
+"""Momentum components that the impacts of a run conserve.
+
+A blow between bodies of a scene changes nothing of the momentum of all; one against the world, such
+as a ball's on its floor, does.  Linear momentum along an axis is kept where the scene can be moved
+along it as one rigid body, hinges on the ground allowing, and what the blow strikes does not come
+nearer by that; angular momentum where it can be turned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+from mstmm.errors import NumericalFailure
+from mstmm.scene import Hinge
+
+from ..engine.fused_code import NoFusedCode
+from ..engine.state_evaluation.kinematics import Kinematics
+from ..run.scene_system import SceneSystem
+from .result_record import Record
+
+#: Parts of a motion, and of the terms of a rate, that count as zero.
+_ZERO_RATIO = 1e-9
+
+
+def momentum_kept_by_impacts(
+    result: Record, roots: Sequence[Hinge], pivot: Array, asked: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """Those components (6,) of what is `asked` that the blows of a run leave as they are: linear
+    momentum along each axis, then angular momentum about `pivot` (3,) in m; `roots` are the hinges
+    on the ground."""
+    kept, impacts = asked.copy(), _impact_samples(result)
+    if impacts is None:
+        return np.zeros_like(asked)
+    if impacts and kept.any():
+        scene = _RigidScene(result, roots, pivot)
+        for row, event in impacts:
+            kept &= scene.untouched(row, event, kept)
+            if not kept.any():
+                break
+    return kept
+
+
+def has_impacts(result: Record) -> bool:
+    """Whether a run has impacts; True also where output times may hide them."""
+    impacts = _impact_samples(result)
+    return impacts is None or bool(impacts)
+
+
+def _impact_samples(result: Record) -> list[tuple[int, int]] | None:
+    """(sample, event) of every impact; None where samples may not show all of them."""
+    bounce_events = {bounce.event for bounce in result.model.packed.watched.bounces}
+    rows = np.flatnonzero(result.event > 0).tolist()
+    statistics = result.statistics
+    if bounce_events and (statistics is None or len(rows) < statistics.events):
+        return None
+    return [(k, event) for k in rows if (event := int(result.event[k]) - 1) in bounce_events]
+
+
+class _RigidScene:
+    """Scene moved as one rigid body at samples of a run."""
+
+    def __init__(self, result: Record, roots: Sequence[Hinge], pivot: Array) -> None:
+        self._result, self._system = result, SceneSystem(result.model.looped)
+        self._speeds = [result.layout(hinge.name).u_slice for hinge in roots]
+        self._names = [hinge.outboard for hinge in roots]
+        self._arms = [result.position(name) - pivot for name in self._names]
+        references = result._observed.references
+        self._kinematics = Kinematics(result.model.looped, NoFusedCode(), references, lambda: None)
+
+    def untouched(self, row: int, event: int, asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Those of the `asked` axes (6,) along and about which the scene can be moved, so that what
+        an event strikes stays as far away."""
+        speeds, allowed = self._rigid(row)
+        remaining = asked & allowed
+        try:
+            remaining[remaining] = self._stays(
+                row, event, speeds[remaining], self._sizes(row)[remaining]
+            )
+        except NumericalFailure:
+            remaining[:] = False
+        return remaining
+
+    def _rigid(self, row: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Speeds (6, nu) of the scene's motions as one body, and which of them (6,) its hinges on
+        the ground allow."""
+        speeds, allowed = np.zeros((6, self._result.model.nu)), np.ones(6, dtype=bool)
+        jacobians = self._kinematics.jacobian(self._names, np.array(self._result.q[row]))
+        for speed_slice, arms, jacobian in zip(self._speeds, self._arms, jacobians, strict=True):
+            twists, columns = _twists(arms[row]), jacobian[:, speed_slice]
+            speeds[:, speed_slice] = (np.linalg.pinv(columns) @ twists).T
+            residuals = np.linalg.norm(columns @ speeds[:, speed_slice].T - twists, axis=0)
+            allowed &= residuals <= _ZERO_RATIO * np.linalg.norm(twists, axis=0)
+        return speeds, allowed
+
+    def _sizes(self, row: int) -> Array:
+        """Speeds (6,) in m/s of the scene's motions, by the bodies on its hinges on the ground."""
+        max_arm = max((float(np.linalg.norm(arms[row])) for arms in self._arms), default=0.0)
+        return np.array([1.0, 1.0, 1.0, max_arm, max_arm, max_arm])
+
+    def _stays(self, row: int, event: int, motions: Array, sizes: Array) -> list[bool]:
+        """Whether an event's value does, at one sample, by each of these speeds (n, nu)."""
+        run, system = self._result.trajectory, self._system
+        system.memory[:] = run.memory[row]
+        t, y = float(run.t[row]), np.concatenate([run.q[row], run.u[row]])
+        rest_rate = system.meeting(event, t, y, np.zeros(motions.shape[1])).rate
+        approaches = [system.meeting(event, t, y, u) for u in motions]
+        return [
+            abs(approach.rate - rest_rate)
+            <= _ZERO_RATIO * (approach.size + approach.steepness * scale)
+            for approach, scale in zip(approaches, sizes, strict=True)
+        ]
+
+
+def _twists(arm: Array) -> Array:
+    """(6, 6) velocity and angular velocity, as columns, of a point at `arm` (3,) in m from a pivot
+    where all moves along each axis by 1 m/s, and turns about each by 1 rad/s."""
+    unit = np.eye(3)
+    return np.block([[unit, np.cross(unit, arm).T], [np.zeros((3, 3)), unit]])

@@ -1,0 +1,75 @@
+"""Loop closure error of a run: gap and slip at its samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import NumericalFailure
+
+from ..engine.loops.loop_calls import LoopCalls
+from ..integrate.steppers import INDEX3_SUFFIX
+
+if TYPE_CHECKING:
+    from ..engine.compiled_scene import CompiledScene
+    from ..run.trajectory import Trajectory
+
+#: Maximum numbers of checked samples and of named rows.
+_MAX_SAMPLES, _MAX_NAMED_ROWS = 12, 8
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and in words
+    how many rows count, those that repeat others, and the components of loads that rigid bodies
+    leave open.  Steps `on_positions` leave slips of the size of their errors."""
+
+    gap: float
+    slip: float
+    counted: str = ""
+    repeated: str = ""
+    open_loads: str = ""
+    on_positions: bool = False
+
+    def __str__(self) -> str:
+        text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
+        text += ", which steps on positions leave" if self.on_positions else ""
+        notes = (
+            ("", self.counted), ("repeat others: ", self.repeated),
+            ("loads left open: ", self.open_loads),
+        )  # fmt: skip
+        return "; ".join((text, *(title + words for title, words in notes if words)))
+
+
+def loop_closure(model: CompiledScene, run: Trajectory) -> Closure | None:
+    """Loop closure of a run; None for trees and runs without samples.
+
+    Loops that a release has opened have no gap.
+    """
+    if model.closed is None or not len(run.t):
+        return None
+    calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
+    for k in np.unique(np.linspace(0, len(run.t) - 1, _MAX_SAMPLES).astype(int)):
+        q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
+        if model.packed.releases:
+            calls.memory = np.array(run.memory[k])
+        gap = max(gap, _max_residual(calls, calls.gap, q, u, t))
+        slip = max(slip, _max_residual(calls, calls.slip, q, u, t))
+    on_positions = run.settings.method.endswith(INDEX3_SUFFIX)
+    loops = model.closed.loops
+    return Closure(
+        gap, slip, loops.counted, loops.repeated(_MAX_NAMED_ROWS), loops.open_loads, on_positions
+    )
+
+
+def _max_residual(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:
+    """Largest constraint residual at one state; nan where it cannot be evaluated."""
+    try:
+        residual = calls.correction(level, q, u, t=t)[1]
+        residual[calls.let_go()] = 0.0
+        return float(np.abs(residual).max(initial=0.0))
+    except NumericalFailure:
+        return np.nan

@@ -1,0 +1,412 @@
+"""Detection of narrow features that the steps of a run missed.
+
+A force that is narrow in a coordinate is seen at the stages of steps alone: where these are long
+it is passed over, and every estimated error is zero.  Behind a run its path is known, and so is
+how narrow a function of a coordinate is along it (`breaks.pace`, with the coordinate in the place
+of time): a step that moved on by more than that, across a peak of the function that neither of its
+ends shows, has not seen it.  What reads speeds, several coordinates, or the length of a spring is
+looked at along the run's time instead.  Where samples are output times the steps are not known; if
+one may have passed over something, the run is made once more to see them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.expression.expression import Expression, Name
+from mstmm.risk import Risk
+
+from ..discontinuities.active_expressions import (
+    ActiveExpression,
+    active_expressions,
+    examined_hinges,
+)
+from ..discontinuities.expression_functions import ExpressionFunctions
+from ..discontinuities.interval_arithmetic import Interval
+from ..discontinuities.interval_enclosures import TIME, Enclosure
+from ..discontinuities.step_limits import CELLS_PER_STEP, StepLimits, WatchedFunction, step_limits
+from ..run.run_execution import RunMonitor, first_run
+from .sources.paths import RunStates, SampledVariable, make_enclosures, sampled_variables
+
+if TYPE_CHECKING:
+    from mstmm.scene import Hinge
+
+    from ..engine.compiled_scene import CompiledScene
+    from ..run.trajectory import Trajectory
+
+#: Part of all it does that a peak must rise by to count.
+_MIN_PEAK_RATIO = 0.1
+
+#: Places of a function that are looked at in a narrow part of it, and its peaks.
+_MAX_POINTS, _MAX_PEAKS = 512, 200
+
+#: Steps up to which a run is made again to see all of them.
+_MAX_RERUN_STEPS = 20_000
+
+#: Expressions by coordinates that are looked at.
+_MAX_EXPRESSIONS = 100
+
+#: A step that was chosen is longer than what it has passed over along time by this factor at
+#: least: what speeds and several coordinates do together is wider than the bounds of it.
+_TIME_STEP_FACTOR = 3.0
+
+#: A peak along time counts from this part of all that a function does around the motion.
+_MIN_RANGE_RATIO = 1e-9
+
+#: Steps of a run that are looked at together over time, and cells of them.
+_STEPS_PER_PIECE, _MAX_CELLS_PER_PIECE = 2**12, 2**15
+
+
+@dataclass(frozen=True)
+class _SampledPath:
+    """A coordinate, or time, along a run: its values (n,) at the start, the samples and the end;
+    between two of them the smallest and the largest, and how far a step went at most, (n - 1,); its
+    unit.  `ranges` are how far functions of time go in the whole run, by their terms: such ones are
+    known between neighbours of `ends` alone."""
+
+    ends: Array
+    least: Array
+    most: Array
+    moved: Array
+    unit: str
+    ranges: Mapping[int, float] = field(default_factory=dict)
+
+
+def missed_feature_risks(model: CompiledScene, run: Trajectory) -> tuple[Risk, ...]:
+    """Findings about expressions with narrow features that steps missed."""
+    risks = _risks_of_steps(model, run)
+    if run.settings.output_times is None or run.settings.step is not None:
+        return risks
+    if not risks and not _may_hide_features(model, run):
+        return ()
+    rerun = _rerun_with_all_steps(model, run)
+    return () if rerun is None else _risks_of_steps(model, rerun)
+
+
+def _risks_of_steps(model: CompiledScene, run: Trajectory) -> tuple[Risk, ...]:
+    """The same of steps that are known; between output times of the longest that there was."""
+    risks = dict[str, Risk]()
+    candidates = chain(_coordinate_candidates(model, run), _time_candidates(model, run))
+    for subject, view, path in islice(candidates, _MAX_EXPRESSIONS):
+        peak = _first_missed_peak(view, path, _has_step_samples(run))
+        if peak is not None:
+            risks.setdefault(subject, _risk(subject, view.variable, path, *peak))
+    return tuple(risks.values())
+
+
+def _has_step_samples(run: Trajectory) -> bool:
+    """Whether samples are where steps ended that were chosen, short where something is seen."""
+    return run.settings.output_times is None and run.settings.step is None
+
+
+def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory | None:
+    """The run once more, as far as it came, with all its steps as samples; None if that takes long,
+    or does not lead there again."""
+    if run.statistics.steps > _MAX_RERUN_STEPS:
+        return None
+    _, q, u = run.first
+    t_end = run.settings.t_end if run.last is None else run.last[0]
+    settings = replace(run.settings, t_end=t_end, output_times=None)
+    rerun = first_run(model, settings, q, u, RunMonitor(None, settings))
+    return replace(rerun, start=(q, u)) if rerun.is_comparable else None
+
+
+def _risk(
+    what: str, name: str, path: _SampledPath, place: float, way: float, longest: float
+) -> Risk:
+    remedy = f"give max_step = {longest:.1g}, or less"
+    if not path.ranges:
+        remedy = (
+            f"write it within where({name} > a, where({name} < b, ..., 0), 0) with a and b close "
+            "around it, where steps end, or give max_step"
+        )
+    return Risk(
+        "narrow-load", what,
+        f"{what} does something near {name} = {place:.6g}, narrower than {longest:.2g}, that steps "
+        f"of up to {way:.2g} there have passed over", remedy, way, longest, path.unit,
+    )  # fmt: skip
+
+
+# --- names and paths ------------------------------------------------------------------------------
+
+
+def _coordinate_candidates(
+    model: CompiledScene, run: Trajectory
+) -> Iterator[tuple[str, ExpressionFunctions, _SampledPath]]:
+    """Whatever acts and reads coordinates: what it is, as a function of one of them, and the path
+    of that."""
+    fractions = _step_fractions(run)
+    if fractions is None:
+        return
+    for load in active_expressions(model.scene):
+        if load.condition or load.spring is not None or load.expression.depends_on_time_only:
+            continue
+        constants = dict(load.constants)
+        for hinge in examined_hinges(load, model.scene.hinges):
+            for name in load.expression.names:
+                path = _coordinate_path(model, run, fractions, name, hinge)
+                if path is not None:
+                    yield (
+                        load.what,
+                        ExpressionFunctions(load.expression, constants, names=(name.text,)),
+                        path,
+                    )
+
+
+def _time_candidates(
+    model: CompiledScene, run: Trajectory
+) -> Iterator[tuple[str, ExpressionFunctions, _SampledPath]]:
+    """Whatever acts and reads speeds, several names or a length, as a function of time; a long run
+    in pieces."""
+    states = _distinct_states(run)
+    if states is None:
+        return
+    max_step = _max_step(run)
+    for load, hinge, constants, names in _multi_variable_loads(model):
+        motion = sampled_variables(model, states, load, hinge)
+        if motion is not None:
+            order = (TIME, *(name for name in names if name != TIME))
+            whole_view = ExpressionFunctions(
+                load.expression, constants, False, order, make_enclosures(states.t, motion, names)
+            )
+            ranges = _function_ranges(whole_view, states.t, {name: motion[name] for name in names})
+            for first in range(0, len(states.t) - 1, _STEPS_PER_PIECE):
+                t = states.t[first : first + _STEPS_PER_PIECE + 1]
+                piece = {
+                    name: SampledVariable(x.values[first : first + _STEPS_PER_PIECE + 1],
+                                 x.rates[first : first + _STEPS_PER_PIECE + 1])
+                    for name, x in motion.items()
+                }  # fmt: skip
+                step_lengths = np.minimum(np.diff(t), max_step)
+                view = ExpressionFunctions(
+                    load.expression, constants, False, order, make_enclosures(t, piece, names)
+                )
+                yield load.what, view, _SampledPath(t, t[:-1], t[1:], step_lengths, "s", ranges)
+
+
+def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
+    """What may have peaks; an angle only jumps, where it passes half a turn."""
+    terms = view.expression.terms
+    return [watched for watched in view.watched() if terms[watched.term].op != "atan2"]
+
+
+def _function_ranges(
+    view: ExpressionFunctions, t: Array, known: Mapping[str, SampledVariable]
+) -> dict[int, float]:
+    """How far functions of an expression go, by their terms: at the times t (n,), and a small part
+    of that around the motion."""
+    result = dict[int, float]()
+    enclosures = _enclosures_around(view.expression, view.constants, known)
+    for term in {view.expression.root, *(watched.term for watched in _peaked_terms(view))}:
+        values, width = view.values(term, t), enclosures[term].value.width
+        finite = values[np.isfinite(values)]
+        result[term] = float(np.ptp(finite)) if len(finite) else 0.0
+        if np.isfinite(width).all():
+            result[term] = max(result[term], _MIN_RANGE_RATIO * float(width.max()))
+    return result
+
+
+def _enclosures_around(
+    expression: Expression, constants: Mapping[str, float], known: Mapping[str, SampledVariable]
+) -> dict[int, Enclosure]:
+    """Bounds of all terms of an expression around a motion."""
+    box = {name: _padded_enclosure(course) for name, course in known.items()}
+    view = ExpressionFunctions(expression, constants, names=(TIME, *known), leaves=lambda _: box)
+    return view.terms(Interval(np.zeros(1), np.zeros(1)))
+
+
+def _multi_variable_loads(
+    model: CompiledScene,
+) -> Iterator[tuple[ActiveExpression, Hinge | None, dict[str, float], list[str]]]:
+    """Whatever acts, may have peaks, and reads more than a coordinate: with its hinge, constants
+    and names."""
+    for load in active_expressions(model.scene):
+        if load.condition or load.drive or load.expression.depends_on_time_only:
+            continue
+        for hinge in islice(examined_hinges(load, model.scene.hinges), _MAX_EXPRESSIONS):
+            constants = dict(load.constants) | ({} if hinge is None else dict(hinge.parameters))
+            names = [n.text for n in load.expression.names if n.text not in constants]
+            is_single = len(names) == 1 and load.spring is None
+            coordinate = is_single and load.expression.names[0].quantity == "q"
+            if not coordinate and _peaked_terms(
+                ExpressionFunctions(load.expression, constants, names=names or [TIME])
+            ):
+                yield load, hinge, constants, names
+
+
+def _may_hide_features(model: CompiledScene, run: Trajectory) -> bool:
+    """Whether what reads speeds or several names may be so narrow, for all that its samples tell,
+    that steps between them have passed over it."""
+    states, max_step = _distinct_states(run), _max_step(run)
+    if states is None or np.diff(states.t).max() <= 2 * max_step:
+        return False
+    for load, hinge, constants, names in _multi_variable_loads(model):
+        motion = sampled_variables(model, states, load, hinge)
+        if motion is None:
+            continue
+        terms = _enclosures_around(load.expression, constants, motion)
+        for watched in _peaked_terms(ExpressionFunctions(load.expression, constants, names=names)):
+            enclosure = terms[watched.term]
+            slope = np.maximum(np.abs(enclosure.slope.lo), np.abs(enclosure.slope.hi))
+            if not (slope * max_step <= 2 * enclosure.value.width).all():
+                return True
+    return False
+
+
+def _padded_enclosure(course: SampledVariable) -> Enclosure:
+    """All values and rates that a number has along a run, with half as much room around."""
+    bounds = []
+    for x in (course.values, course.rates):
+        margin = 0.25 * np.ptp(x)
+        bounds.append(Interval(np.array([x.min() - margin]), np.array([x.max() + margin])))
+    return Enclosure(*bounds)
+
+
+def _distinct_states(run: Trajectory) -> RunStates | None:
+    """States of a run at times that differ, the last of each; None where there is no way."""
+    t, q, u = _all_states(run)
+    memory = run.memory
+    if run.start is not None and run.last is not None and len(memory):
+        memory = np.concatenate([memory[:1], memory, memory[-1:]])
+    if len(t) < 2 or len(memory) != len(t) or not (np.isfinite(q).all() and np.isfinite(u).all()):
+        return None
+    last = np.append(np.diff(t) > 0, True)
+    return RunStates(t[last], q[last], u[last], memory[last]) if last.sum() > 1 else None
+
+
+def _max_step(run: Trajectory) -> float:
+    """No step between two samples is longer than this, s."""
+    settings = run.settings
+    if settings.output_times is None:
+        return np.inf
+    max_step = settings.step if settings.step is not None else run.statistics.largest_step
+    return np.inf if max_step is None else max_step
+
+
+def _all_states(run: Trajectory) -> tuple[Array, Array, Array]:
+    """(t, q, u) at the start, the samples and the end."""
+    t, q, u = run.t, run.q, run.u
+    if run.start is not None and run.last is not None:
+        (end, *last), first = run.last, (run.settings.t_start, *run.start)
+        rows = zip(first, (t, q, u), (end, *last), strict=True)
+        t, q, u = (np.concatenate([np.asarray(a)[None], x, np.asarray(b)[None]])
+                   for a, x, b in rows)  # fmt: skip
+    return t, q, u
+
+
+def _step_fractions(run: Trajectory) -> Array | None:
+    """Part of the way between two of these states that one step went, at most; None where there is
+    no way."""
+    settings, (t, q, _) = run.settings, _all_states(run)
+    if len(t) < 2 or not np.isfinite(q).all():
+        return None
+    intervals = np.diff(t)
+    max_step = settings.step if settings.step is not None else run.statistics.largest_step
+    if settings.output_times is None or max_step is None:
+        return np.ones(len(intervals))
+    return np.divide(max_step, intervals, out=np.ones(len(intervals)), where=intervals > max_step)
+
+
+def _coordinate_path(
+    model: CompiledScene, run: Trajectory, parts: Array, name: Name, own: Hinge | None
+) -> _SampledPath | None:
+    """Of a coordinate; None for other names."""
+    hinge = name.hinge or ("" if own is None else own.name)
+    if name.quantity != "q" or not hinge:
+        return None
+    slots, index = model.layout.hinges[hinge], name.index or 0
+    t, q, u = _all_states(run)
+    ends = q[:, slots.q + index]
+    values = np.stack([ends[:-1], ends[1:]])
+    if slots.straight:
+        values = _cubic_values(np.diff(t), ends, u[:, slots.u + index])
+    distance = np.abs(np.diff(values, axis=0)).sum(axis=0)
+    return _SampledPath(
+        ends, values.min(axis=0), values.max(axis=0), parts * distance, slots.q_units[index]
+    )
+
+
+def _cubic_values(h: Array, ends: Array, rates: Array) -> Array:
+    """(7, n - 1) values between ends (n,) that are h (n - 1,) apart, those among them; of cubics
+    with these rates."""
+    x = np.linspace(0.0, 1.0, 7)[:, None]
+    a, b, va, vb = ends[:-1], ends[1:], h * rates[:-1], h * rates[1:]
+    return np.asarray(a + x * (b - a) + x * (1 - x) * ((1 - x) * (va - b + a) + x * (b - a - vb)))
+
+
+# --- peaks ----------------------------------------------------------------------------------------
+
+
+def _first_missed_peak(
+    view: ExpressionFunctions, path: _SampledPath, ends_are_steps: bool
+) -> tuple[float, float, float] | None:
+    """(where, how far steps went there, how far they should) of the first peak passed over."""
+    low, high = float(path.least.min()), float(path.most.max())
+    watched = _peaked_terms(view) if path.ranges else view.watched()
+    if not high > low or not watched:
+        return None
+    edges = path.ends if path.ranges else None
+    max_cells = _MAX_CELLS_PER_PIECE if path.ranges else view.most
+    resolution = step_limits(view.terms, watched, low, high, max_cells, edges)
+    is_narrow = resolution.longest < path.moved.max(initial=0.0)
+    if not is_narrow.any():
+        return None
+    root = view.expression.root
+    for term in watched:
+        positions, values, limits = _narrow_peaks(view, term, resolution, is_narrow, high)
+        ends = view.values(term.term, path.ends)
+        for position, value, limit in zip(positions, values, limits, strict=True):
+            is_long = (
+                path.moved > (_TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0) * limit
+            )
+            missed = (path.least <= position) & (position <= path.most) & is_long
+            if ends_are_steps or path.ranges:
+                function_range = max(
+                    np.ptp(np.append(values, ends)), path.ranges.get(term.term, 0.0)
+                )
+                missed &= (
+                    _hidden_height(value, ends, ends_are_steps) > _MIN_PEAK_RATIO * function_range
+                )
+            if path.ranges and missed.any():  # a part that is narrow may do nothing to the whole
+                whole_values = view.values(root, np.append(path.ends, position))
+                missed &= (
+                    _hidden_height(whole_values[-1], whole_values[:-1], ends_are_steps)
+                    > _MIN_PEAK_RATIO * path.ranges[root]
+                )
+            if missed.any():
+                return position, float(path.moved[missed].max()), limit
+    return None
+
+
+def _hidden_height(value: float, ends: Array, both: bool) -> Array:
+    """(n - 1,) how far a value is from those at the ends (n,) of steps: from both, or from one."""
+    distances = np.abs(value - ends)
+    return np.asarray((np.minimum if both else np.maximum)(distances[1:], distances[:-1]))
+
+
+def _narrow_peaks(
+    view: ExpressionFunctions, one: WatchedFunction, known: StepLimits, narrow: Array, high: float
+) -> tuple[Array, Array, Array]:
+    """Peaks of a function in its narrow parts: where, how high, and how far a step may go there."""
+    ends = np.append(known.starts[1:], high)
+    positions, limits = [np.zeros(0)], [np.zeros(0)]
+    parts = (known.starts, ends, known.longest)
+    for a, b, limit_of_part in zip(*(part[narrow] for part in parts), strict=True):
+        count = int(min(np.ceil(2 * CELLS_PER_STEP * (b - a) / limit_of_part), _MAX_POINTS)) + 2
+        positions.append(np.linspace(a, b, count))
+        limits.append(np.full(count, limit_of_part))
+    points, first_indices = np.unique(
+        np.concatenate(positions), return_index=True
+    )  # where parts meet
+    limit = np.concatenate(limits)[first_indices]
+    values = view.values(one.term, points)
+    signs = np.sign(np.diff(values))
+    moving = np.flatnonzero(np.abs(signs) > 0)  # between places of equal height it has turned, too
+    peak_indices = moving[1:][np.diff(signs[moving]) != 0][:_MAX_PEAKS]
+    return points[peak_indices], values[peak_indices], limit[peak_indices]

@@ -1,0 +1,184 @@
+"""Observations of the states of a run, computed in batches on first use and cached.
+
+One batch of the engine gives everything at once for a run of usual size; where that would not fit
+into memory, each body and each kind of quantity is a batch of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.argument_validation import require_word
+from mstmm.array_validation import Array
+
+from ..engine.body_references import BodyReferences
+from ..engine.engine_calls import OBSERVATION_PARTS, Probe
+
+if TYPE_CHECKING:
+    from ..engine.compiled_scene import CompiledScene
+    from ..packing.coordinate_layout import Layout
+    from ..run.trajectory import Trajectory
+
+
+#: Numbers of one batch, about 130 MB.
+_MAX_BATCH_NUMBERS = 2**24
+
+#: Bodies and ends of a scene up to which all of them are observed together.
+_MAX_JOINT_REFERENCES = 1000
+
+
+class Observations:
+    """Arrays over the samples of a trajectory.  Rows that cannot be evaluated are nan.
+
+    `failures` holds one sentence for each such row, as far as they have been met.
+    """
+
+    def __init__(self, model: CompiledScene, run: Trajectory) -> None:
+        self.engine, self.run, self._model = model.looped, run, model
+        self.failures: tuple[str, ...] = ()
+        self.references = BodyReferences(model.scene.skeleton)
+        self._points: dict[str, Array] = {}
+        self._parts: dict[str, Array] = {}
+
+    def points(self, reference: str) -> Array:
+        """(n, 24): motion of "body" or "body.end", see `Observation`."""
+        require_word("body", reference, "the name of a body or an end, such as 'rod1.tip'")
+        if reference not in self._points:
+            canonical_name = self.references.place(reference)
+            self._observe("points", canonical_name)
+            self._points[reference] = self._points[canonical_name]
+        return self._points[reference]
+
+    def node(self, name: str) -> Array:
+        """(n, 24): as `points` of a body of the engine's own scene, such as a point mass of a beam
+        "blade/point 1", or of any body of the user's."""
+        if name not in self._points:
+            self._seen([name], ("points",))
+        return self._points[name]
+
+    def fetch(self, references: Sequence[str]) -> None:
+        """Observe these bodies and ends in one batch, before they are read one by one."""
+        if len(self.references) > _MAX_JOINT_REFERENCES:
+            missing = [name for name in references if name not in self._points]
+            if missing and len(self.run.t) * 24 * len(missing) <= _MAX_BATCH_NUMBERS:
+                self._seen(missing, ("points",))
+
+    def part(self, name: str) -> Array:
+        """loads, efforts, udot, sums or rows, see `Observation`."""
+        if name not in self._parts:
+            self._observe(name, None)
+        return self._parts[name]
+
+    def columns(self, name: str, which: Any) -> Array:
+        """Some columns `which` of loads, efforts or udot; of large ones no more is kept."""
+        return np.concatenate([part[(slice(None), *which)] for part in self._pieces(name)])
+
+    def loads(self, hinge: str, first: int) -> Array:
+        """(n, 3) force (first 0) or moment (3) of a hinge."""
+        observations, hinge_index = self, self.engine.packed.hinge_position.get(hinge)
+        if hinge_index is None:  # of a hinge that welds bodies packed as one
+            observations = self.apart
+            hinge_index = observations.engine.packed.hinge_position[hinge]
+        return observations.columns("loads", (hinge_index, slice(first, first + 3)))
+
+    @cached_property
+    def apart(self) -> Observations:
+        """The same by the engine in which every body is by itself."""
+        result = Observations(self._model, self.run)
+        result.engine = self._model.apart
+        return result
+
+    def largest_loads(self) -> tuple[float, float]:
+        """Largest component of force (N) and of moment (N*m) over all hinges."""
+        largest = [0.0, 0.0]
+        for part in self._pieces("loads"):
+            for k in (0, 1):
+                numbers = part[:, :, 3 * k : 3 * k + 3]
+                numbers = np.abs(numbers[np.isfinite(numbers)])
+                largest[k] = max(largest[k], float(np.max(numbers, initial=0.0)))
+        return largest[0], largest[1]
+
+    def _pieces(self, name: str) -> Iterator[Array]:
+        """A part, piece by piece in time where all of it would not fit into memory."""
+        width = {"loads": 6 * self.engine.packed.topology.count}.get(name, self.engine.nu)
+        run, rows = self.run, max(1, _MAX_BATCH_NUMBERS // max(1, width))
+        if name in self._parts or len(run.t) <= rows:
+            yield self.part(name)
+            return
+        for first in range(0, len(run.t), rows):
+            piece = slice(first, first + rows)
+            observation = self.engine.observe(
+                run.t[piece], run.q[piece], run.u[piece], run.memory[piece], (), (name,)
+            )
+            self.failures = self.failures or observation.failures
+            yield getattr(observation, name)
+
+    def _observe(self, part: str, reference: str | None) -> None:
+        run = self.run
+        bodies, nu = self.engine.packed.topology.count, self.engine.nu
+        size = len(run.t) * (24 * len(self.references) + 6 * bodies + 2 * nu + 10)
+        is_joint = size <= _MAX_BATCH_NUMBERS and len(self.references) <= _MAX_JOINT_REFERENCES
+        parts = OBSERVATION_PARTS if is_joint else (part,)
+        if not is_joint or (reference is not None and reference not in self.references):
+            references = [] if reference is None else [reference]
+        else:
+            references = list(self.references)
+        self._seen(references, parts)
+
+    def _seen(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
+        run = self.run
+        probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
+        observation = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
+        if "efforts" in parts:
+            _clear_modal_efforts(observation.efforts, self.engine.packed.layout)
+        for array in (
+            observation.points,
+            *(getattr(observation, name) for name in OBSERVATION_PARTS),
+        ):
+            array.flags.writeable = False
+        self.failures = self.failures or observation.failures
+        for i, name in enumerate(wanted):
+            self._points[name] = observation.points[:, i]
+        self._parts |= {name: getattr(observation, name) for name in parts if name != "points"}
+
+
+def _clear_modal_efforts(efforts: Array, layout: Layout) -> None:
+    """Set efforts on modes to zero: laws and drives act on hinges only."""
+    for slots in layout.modal.values():
+        efforts[:, slots.u_slice] = 0.0
+
+
+def quaternions(matrices: Array) -> Array:
+    """Unit quaternions (n, 4), w, x, y, z, of rotation matrices (n, 9), row by row.
+
+    The largest of the four components is found first, so that no division is by a small number
+    (Shepperd, J. Guidance and Control 1 (1978) 223-224).  The sign is continuous over the rows and
+    w >= 0 in the first one.
+    """
+    r = matrices.reshape(-1, 3, 3)
+    x, y, z = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    squares = np.stack([1 + x + y + z, 1 + x - y - z, 1 - x + y - z, 1 - x - y + z], axis=1)
+    largest = np.argmax(np.nan_to_num(squares), axis=1)
+    a, b, c = r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]
+    d, e, f = r[:, 0, 1] + r[:, 1, 0], r[:, 0, 2] + r[:, 2, 0], r[:, 1, 2] + r[:, 2, 1]
+    w2, x2, y2, z2 = squares.T
+    rows = np.stack([
+        np.stack([w2, a, b, c], 1), np.stack([a, x2, d, e], 1),
+        np.stack([b, d, y2, f], 1), np.stack([c, e, f, z2], 1),
+    ], 1)  # fmt: skip
+    q = rows[np.arange(len(r)), largest]
+    q /= np.sqrt(np.sum(q * q, axis=1, keepdims=True))
+    return np.asarray(q * continuous_signs(q)[:, None])
+
+
+def continuous_signs(q: Array) -> Array:
+    """Signs (n,) that make neighbouring quaternions point the same way; +w first."""
+    if not len(q):
+        return np.ones(0)
+    steps = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)
+    first = -1.0 if q[0, 0] < 0 else 1.0
+    return np.asarray(first * np.concatenate([[1.0], np.cumprod(steps)]))

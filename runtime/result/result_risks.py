@@ -1,0 +1,84 @@
+"""Findings from the numbers of a run: overflow, drift, quaternion length."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.risk import RUN, Risk
+
+from ..integrate.achieved_error import AchievedError
+from ..run.trajectory import Trajectory
+from .certificate_data import Drift
+from .step_control import StepControl
+
+#: Distance of a quaternion's length from 1 that is a risk.
+MAX_LENGTH_ERROR = 1e-3
+
+
+def finiteness_risks(finite: bool, reached: AchievedError | None) -> Iterator[Risk]:
+    """Findings: states that are not finite, and a target error that was not achieved."""
+    if not finite:
+        yield Risk(
+            "not-finite", RUN, "the states hold numbers that are not finite",
+            "use smaller steps or tolerances, or find what goes to infinity",
+        )  # fmt: skip
+    if reached is not None and reached.risk is not None:
+        yield reached.risk
+
+
+def output_risks(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk]:
+    """Findings: outputs that are not finite at finite states."""
+    if not len(run.t):
+        return
+    is_state_finite = np.asarray(np.isfinite(np.hstack([run.q, run.u])).all(axis=1))
+    for name, values in outputs.items():
+        is_invalid = is_state_finite & ~np.isfinite(values.reshape(len(run.t), -1)).all(axis=1)
+        if is_invalid.any():
+            first_time = float(run.t[int(np.argmax(is_invalid))])
+            yield Risk(
+                "not-finite",
+                f'output "{name}"',
+                f'output "{name}" is not finite at {int(is_invalid.sum())} of {len(run.t)} '
+                f"samples, "
+                f"first at t = {first_time:.6g} s",
+                "keep what it divides by and takes roots and logarithms of within their range",
+            )
+
+
+def balance_risks(drifts: Sequence[Drift], control: StepControl) -> Iterator[Risk]:
+    """Findings: energy and momentum that are unknown, or drift more than steps explain."""
+    for drift in drifts:
+        if not drift.known:
+            yield Risk(
+                _drift_risk_name(drift), drift.name,
+                f"{drift.name} cannot be balanced: it is beyond what numbers hold, or no sample "
+                "gives it", "use smaller steps or tolerances, or find what goes to infinity",
+            )  # fmt: skip
+    for drift in drifts:
+        if drift.relative > control.bound:
+            yield Risk(
+                _drift_risk_name(drift),
+                drift.name,
+                f"{drift.name} is not kept: it changes by {drift}",
+                control.finer(drift.relative),
+                drift.relative,
+                control.bound,
+            )
+
+
+def quaternion_risks(residual: float) -> Iterator[Risk]:
+    """Finding: quaternions far from unit length before normalisation."""
+    if residual > MAX_LENGTH_ERROR:
+        yield Risk(
+            "quaternion-length", RUN,
+            f"quaternions were {residual:.1e} off their length 1 between the steps: attitudes err "
+            "by about as much", "take smaller tolerances, or a method of the package", residual,
+            MAX_LENGTH_ERROR,
+        )  # fmt: skip
+
+
+def _drift_risk_name(drift: Drift) -> str:
+    return "energy-drift" if drift.unit == "J" else "momentum-drift"

@@ -1,0 +1,154 @@
+"""When a run is looked at, and where everything is in between its samples."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array, finite_float
+from mstmm.errors import SceneError
+
+from ..observations import quaternions
+from .scene_graph import Poses
+
+if TYPE_CHECKING:
+    from ..result_record import Record
+
+#: Pictures a second, and how long a film should be at least and at most (s).
+FRAME_RATE, MIN_DURATION, MAX_DURATION = 30.0, 1.5, 20.0
+#: Places of owners that a film may hold; beyond them it has fewer pictures.
+_MAX_POSES = 90_000
+_MIN_FRAMES = 24
+#: Places of a trail from one picture to the next.
+_TRAIL_POINTS_PER_FRAME = 4
+_SPEED_EXPECTATION = "seconds of the run that pass in one second, above 0"
+
+
+@dataclass(frozen=True)
+class FrameTimes:
+    """The moments of a film of a run.
+
+    Attributes:
+        kept: samples of the run that can be drawn; two at the same time stand before and behind an
+            event.
+        t: (n,) s, their times.
+        times: (f,) s, the moments.
+        speed: seconds of the run per second of film.
+    """
+
+    kept: NDArray[np.int64]
+    t: Array
+    times: Array
+    speed: float
+
+    @classmethod
+    def of(
+        cls, run: Record, owners: int, speed: float | None, most: int | None = None
+    ) -> FrameTimes:
+        """Moments for a scene of so many bodies and hinges.
+
+        `speed` by itself is 1, or for short and long runs what gives a film of some seconds.
+        SceneError for a run without a sample.
+        """
+        finite = np.flatnonzero(np.isfinite(run.q).all(axis=1))
+        if not len(finite):
+            raise SceneError("there is nothing to look at: the run has no sample with numbers")
+        finite_samples, t = finite, run.t[finite]
+        duration = float(t[-1] - t[0])
+        if duration == 0:
+            return cls(finite_samples[-1:], t[-1:], t[-1:], 1.0)
+        speed = (
+            natural_speed(duration)
+            if speed is None
+            else finite_float("speed", speed, _SPEED_EXPECTATION)
+        )
+        if speed <= 0:
+            raise SceneError(f"speed = {speed:g}: expected {_SPEED_EXPECTATION}")
+        count = math.ceil(duration / speed * FRAME_RATE) + 1
+        count = max(2, min(count, most or count, max(_MIN_FRAMES, _MAX_POSES // max(1, owners))))
+        return cls(finite_samples, t, np.linspace(t[0], t[-1], count), speed)
+
+    @cached_property
+    def _exact(self) -> bool:
+        return len(self.times) == len(self.t) and bool(np.array_equal(self.times, self.t))
+
+    def smooth(self, values: Array, rates: Array) -> Array:
+        """Values (n, ...) with their time rates at the moments, by cubic Hermite pieces."""
+        if self._exact:
+            return values
+        from scipy.interpolate import CubicHermiteSpline
+
+        def between(part: slice, at: Array) -> Array:
+            return np.asarray(CubicHermiteSpline(self.t[part], values[part], rates[part])(at))
+
+        return self._pieces(values, between)
+
+    def straight(self, values: Array) -> Array:
+        """Values (n, k) at the moments, straight between samples."""
+
+        def between(part: slice, at: Array) -> Array:
+            columns = [np.interp(at, self.t[part], column) for column in values[part].T]
+            return np.array(columns).reshape(len(columns), len(at)).T
+
+        return self._pieces(values, between)
+
+    def turned(self, quaternions: Array) -> Array:
+        """Quaternions (n, 4) at the moments, w first, at even rates between samples."""
+        from scipy.spatial.transform import Rotation, Slerp
+
+        def between(part: slice, at: Array) -> Array:
+            turns = Rotation.from_quat(quaternions[part][:, [1, 2, 3, 0]])
+            found: Array = Slerp(self.t[part], turns)(at).as_quat()[:, [3, 0, 1, 2]]
+            return found
+
+        return self._pieces(quaternions, between)
+
+    def _pieces(self, values: Array, between: Callable[[slice, Array], Array]) -> Array:
+        """`between` on each stretch of samples without an event; what an event changes at one time
+        is what it is behind it."""
+        if len(self.t) == 1:
+            return np.repeat(values[:1], len(self.times), axis=0)
+        result = np.empty((len(self.times), *values.shape[1:]))
+        bounds = [0, *(np.flatnonzero(np.diff(self.t) <= 0) + 1), len(self.t)]
+        for first, end_index in pairwise(bounds):
+            inside = (self.times >= self.t[first]) & (self.times <= self.t[end_index - 1])
+            part = slice(first, end_index)
+            if end_index - first == 1:
+                result[inside] = values[first]
+            elif inside.any():
+                result[inside] = between(part, self.times[inside])
+        return result
+
+    def way(self, run: Record, reference: str) -> Array:
+        """(n, 3) m, the way of a body's origin or an end, in steps of time finer than a film's."""
+        trail_times = replace(self, times=np.linspace(self.times[0], self.times[-1], self._fine))
+        points = run._observed.points(reference)[self.kept]
+        return trail_times.smooth(points[:, 0:3], points[:, 3:6])
+
+    @property
+    def _fine(self) -> int:
+        return _TRAIL_POINTS_PER_FRAME * (len(self.times) - 1) + 1
+
+    def poses(self, run: Record, reference: str) -> Poses:
+        """The axes of a body or an end."""
+        points = run._observed.points(reference)[self.kept]
+        position = self.smooth(points[:, 0:3], points[:, 3:6])
+        orientation = quaternions(points[:, 15:24])
+        return Poses(position, orientation if self._exact else self.turned(orientation))
+
+
+def natural_speed(lasts: float) -> float:
+    """1, or 1, 2 or 5 times a power of ten so that a film lasts some seconds."""
+    if MIN_DURATION <= lasts <= MAX_DURATION:
+        return 1.0
+    target_speed = lasts / (4 * MIN_DURATION if lasts < MIN_DURATION else MAX_DURATION / 2)
+    power = 10.0 ** math.floor(math.log10(target_speed))
+    steps = (1, 2, 5, 10)
+    return power * min(steps, key=lambda step: abs(math.log(step * power / target_speed)))

@@ -1,0 +1,186 @@
+"""A stage as pictures: a strip of moments, numbered frames, GIF and MP4 (extra: plot)."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+
+from mstmm.errors import EnvironmentFailure, MstmmError
+from mstmm.optional_packages import missing_package_error
+from mstmm.safe_text import escape_control_characters
+
+from .page_selector import Part
+from .projection import ProjectedFrame
+from .scene_graph import SceneGraph
+
+#: Endings of strips and of films.
+STRIP_SUFFIXES, FILM_SUFFIXES = (".png", ".svg", ".pdf"), (".gif", ".mp4")
+
+#: Inches: width of a strip and of a frame, room for a line of text; dots per inch of frames.
+_STRIP_WIDTH, _FRAME_WIDTH, _LINE_HEIGHT, _FRAME_DPI = 7.2, 6.4, 0.28, 100
+#: Most pictures a second of a GIF, which is large; moments in one row of a strip.
+_MAX_GIF_RATE, _MAX_STRIP_COLUMNS = 15.0, 6
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture: a stage at a moment, and what stands above it."""
+
+    flat: ProjectedFrame
+    moment: int
+    title: str
+
+
+def film_frames(parts: Sequence[Part], whole: SceneGraph) -> list[Frame]:
+    """Every moment of every part, one part after the other, in the window of them all."""
+    flats = [ProjectedFrame(part, whole) for _, part in parts]
+    several = len(parts) > 1
+    return [
+        Frame(
+            flat,
+            k,
+            _frame_title(f"{whole.title}   {name}" if several else whole.title, flat.stage, k),
+        )
+        for flat, (name, _) in zip(flats, parts, strict=True)
+        for k in range(len(whole.times))
+    ]
+
+
+def strip_frames(parts: Sequence[Part], whole: SceneGraph, count: int) -> list[Frame]:
+    """So many moments; of several parts the first moment of each."""
+    if len(parts) > 1:
+        return [Frame(ProjectedFrame(part, whole), 0, name) for name, part in parts]
+    indices = np.unique(np.linspace(0, len(whole.times) - 1, max(1, count)).round().astype(int))
+    quantity, unit = whole.clock
+    flat = ProjectedFrame(whole)
+    return [Frame(flat, int(k), f"{quantity} = {whole.times[k]:.3g} {unit}") for k in indices]
+
+
+def write_strip(shots: Sequence[Frame], file: Path | IO[bytes], kind: str, title: str = "") -> None:
+    """Pictures side by side, for papers; `kind` is png, svg or pdf."""
+    shape = shots[0].flat.shape
+    columns = _column_count(len(shots), shape)
+    rows = -(-len(shots) // columns)
+    cell_width, title_height = _STRIP_WIDTH / columns, _LINE_HEIGHT if title else 0.0
+    figure = _new_figure(_STRIP_WIDTH, rows * (cell_width * shape + _LINE_HEIGHT) + title_height)
+    for cell_index, shot in enumerate(shots):
+        axis = figure.add_subplot(rows, columns, cell_index + 1)
+        shot.flat.draw(axis, shot.moment)
+        axis.set_title(escape_control_characters(shot.title), fontsize=8.5, pad=2, parse_math=False)
+    top = 1 - (0.8 * _LINE_HEIGHT + title_height) / figure.get_figheight()
+    if title:
+        figure.suptitle(
+            escape_control_characters(title),
+            fontsize=10.5,
+            y=1 - 0.2 * title_height / figure.get_figheight(),
+            va="top",
+            parse_math=False,
+        )
+    figure.subplots_adjust(0.01, 0.01, 0.99, top, 0.04, 0.14)
+    figure.savefig(file, dpi=200, format=kind)
+
+
+def _column_count(count: int, shape: float) -> int:
+    """Moments in a row: about as many as make the strip wider than it is tall."""
+    max_columns = (
+        _MAX_STRIP_COLUMNS if shape > 0.8 else max(1, int(np.ceil(np.sqrt(count * shape * 2.2))))
+    )
+    rows = -(-count // min(count, max_columns))
+    return -(-count // rows)  # rows alike, so that the last one has no hole
+
+
+def write_film(shots: Sequence[Frame], path: Path) -> None:
+    """A GIF or an MP4, by the ending.  EnvironmentFailure where an MP4 lacks ffmpeg."""
+    stage = shots[0].flat.stage
+    figure, axis = _frame_figure(shots[0].flat)
+    from matplotlib import animation, rc_context
+
+    duration = _film_duration(stage)
+    rate = max(1, round((len(stage.times) - 1) / duration)) if duration else 1
+    gif = path.suffix.lower() == ".gif"
+    frame_step = max(1, round(rate / _MAX_GIF_RATE)) if gif else 1
+    with rc_context({} if gif else {"animation.ffmpeg_path": _ffmpeg_path()}):
+        writer: Any = (
+            animation.PillowWriter(fps=max(1, round(rate / frame_step)))
+            if gif
+            else animation.FFMpegWriter(fps=rate, codec="h264", extra_args=_FFMPEG_ARGUMENTS)
+        )
+        with writer.saving(figure, str(path), dpi=_FRAME_DPI):
+            for shot in shots[::frame_step]:
+                _show_frame(axis, shot)
+                writer.grab_frame(facecolor="white")
+
+
+#: Every player takes this kind of colours; sizes must be even.
+_FFMPEG_ARGUMENTS = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
+
+
+def write_frames(shots: Sequence[Frame], folder: Path) -> Sequence[Path]:
+    """Every picture as frame_0001.png and so on; MstmmError where the folder cannot be made."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise MstmmError(f'frames: "{folder}" cannot be made ({error.strerror})') from None
+    figure, axis = _frame_figure(shots[0].flat)
+    paths = []
+    for k, shot in enumerate(shots, 1):
+        _show_frame(axis, shot)
+        paths.append(folder / f"frame_{k:04d}.png")
+        figure.savefig(paths[-1], dpi=_FRAME_DPI)
+    return paths
+
+
+def _frame_figure(flat: ProjectedFrame) -> tuple[Any, Any]:
+    figure = _new_figure(
+        _FRAME_WIDTH, min(_FRAME_WIDTH * flat.shape, 1.4 * _FRAME_WIDTH) + _LINE_HEIGHT
+    )
+    axes_height = 1 - _LINE_HEIGHT / figure.get_figheight()
+    return figure, figure.add_axes((0.0, 0.0, 1.0, axes_height))
+
+
+def _show_frame(axis: Any, shot: Frame) -> None:
+    axis.clear()
+    shot.flat.draw(axis, shot.moment)
+    axis.set_title(escape_control_characters(shot.title), fontsize=9, pad=4, parse_math=False)
+
+
+def _frame_title(title: str, stage: SceneGraph, k: int) -> str:
+    quantity, unit = stage.clock
+    rate = "" if stage.speed == 1 or unit != "s" else f"   ({stage.speed:g} s in a second)"
+    digits = stage.digits if unit == "s" else 0
+    return f"{title}   {quantity} = {stage.times[k]:.{digits}f} {unit}{rate}"
+
+
+def _film_duration(stage: SceneGraph) -> float:
+    return float(stage.times[-1] - stage.times[0]) / stage.speed
+
+
+def _new_figure(wide: float, tall: float) -> Any:
+    try:
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise missing_package_error("plot", "a film or a strip", error) from None
+    figure = Figure(figsize=(wide, tall), facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _ffmpeg_path() -> str:
+    """The program that writes an MP4: ffmpeg, or the one that imageio-ffmpeg brings."""
+    executable = shutil.which("ffmpeg")
+    if executable is None:
+        try:
+            executable = import_module("imageio_ffmpeg").get_ffmpeg_exe()
+        except ImportError:
+            raise EnvironmentFailure(
+                "an MP4 needs the program ffmpeg, which is not on this machine; install it, or "
+                "pip install imageio-ffmpeg, or take a name ending in .gif"
+            ) from None
+    return str(executable)

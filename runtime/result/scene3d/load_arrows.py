@@ -1,0 +1,165 @@
+"""What acts on the bodies, as arrows: loads and gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.scene import Load, split_reference
+
+from ..flexible import motion as observed
+from ..sources.applied_loads import AppliedLoads as Values
+from ..sources.loads import inertial_components
+from . import arrows, flexible_geometry
+from .frame_times import FrameTimes
+from .scene_graph import DeformingSurface, ObjectLabel, Poses, SceneGraph, Solid
+from .solid_meshes import Colour, Faces, Surface
+
+if TYPE_CHECKING:
+    from ..result_record import Record
+
+_LOAD_COLOUR: Colour = (205, 55, 50)
+_GRAVITY_COLOUR: Colour = (85, 105, 130)
+#: Length of the largest force, radius of the largest moment, thickness of their arrows, by the size
+#: of the scene; the same of gravity's arrow, and how far it is from the scene.
+_FORCE_LENGTH, _MOMENT_RADIUS, _SHAFT_RADIUS = 0.16, 0.08, 0.005
+_GRAVITY_LENGTH, _GRAVITY_RADIUS, _GRAVITY_DISTANCE = 0.1, 0.0035, 0.05
+#: Arrows of a load per length, and how long they are beside one of the same force.
+_ARROWS_PER_LINE_LOAD, _LINE_LOAD_SCALE = 7, 0.5
+
+
+@dataclass(frozen=True)
+class _LoadHistory:
+    """A load over the moments: force (f, 3) N and moment (f, 3) N*m, where it acts (f, 3) m, all
+    places if there are several, and the axes of its end."""
+
+    load: Load
+    force: Array
+    moment: Array
+    places: list[Array]
+    pose: Poses
+
+
+class LoadArrows:
+    """The loads of a run, over the moments of a film; `size` (m) is that of the scene."""
+
+    def __init__(self, run: Record, when: FrameTimes, size: float) -> None:
+        self.run, self.when, self.size = run, when, size
+        values = Values(run._observed)
+        self.seen = [self._one(load, k, values) for k, load in enumerate(run.model.scene.load)]
+
+    def _one(self, load: Load, number: int, values: Values) -> _LoadHistory:
+        numbers = values.system.loads[number]
+        wrench = np.hstack(
+            [inertial_components(values, number, x) for x in (numbers.force, numbers.moment)]
+        )
+        wrench = self.when.straight(wrench[self.when.kept])
+        beams = {beam.name for beam in self.run.model.scene.beam}
+        at_root = load.on in beams and load.force_per_length is None
+        pose = self.when.poses(self.run, f"{load.on}.root" if at_root else load.on)
+        if load.at is not None:
+            points = values.load(number)[0][self.when.kept]
+            pose = replace(pose, position=self.when.smooth(points[:, 0:3], points[:, 3:6]))
+        positions = [pose.position]
+        if (
+            load.force_per_length is not None
+            and split_reference(load.on)[0] in self.run.model.flexible
+        ):
+            positions = self._along(load, pose)
+        return _LoadHistory(load, wrench[:, :3], wrench[:, 3:], positions, pose)
+
+    def _along(self, load: Load, pose: Poses) -> list[Array]:
+        motion = flexible_geometry.motion_at(self.run, split_reference(load.on)[0], self.when, pose)
+        first, last = load.span or (0.0, float(motion.shapes.length))
+        return list(
+            np.moveaxis(
+                observed.deflected_axis(motion, np.linspace(first, last, _ARROWS_PER_LINE_LOAD)),
+                1,
+                0,
+            )
+        )
+
+    def bent(self) -> Iterator[DeformingSurface]:
+        """Arrows of forces and moments, those of a kind to one scale."""
+        max_force = max((_max_norm(history.force) for history in self.seen), default=0.0)
+        max_moment = max((_max_norm(history.moment) for history in self.seen), default=0.0)
+        shaft_radius = _SHAFT_RADIUS * self.size
+        for history in self.seen:
+            if _max_norm(history.force) > 0:
+                scale = 1.0 if len(history.places) == 1 else _LINE_LOAD_SCALE
+                vector = scale * _FORCE_LENGTH * self.size / max_force * history.force
+                arrow_meshes = [
+                    arrows.straight_arrows(position, vector, shaft_radius)
+                    for position in history.places
+                ]
+                yield _joined_arrows(f"forces/{history.load.name}", arrow_meshes)
+            if _max_norm(history.moment) > 0:
+                vector = _MOMENT_RADIUS * self.size / max_moment * history.moment
+                arrow_meshes = [
+                    arrows.circular_arrows(position, vector, shaft_radius)
+                    for position in history.places
+                ]
+                yield _joined_arrows(f"moments/{history.load.name}", arrow_meshes)
+
+    def poses(self) -> Iterator[tuple[str, Poses]]:
+        """Owners of what the page says of loads."""
+        for history in self.seen:
+            yield f"loads/{history.load.name}", history.pose
+
+    def told(self) -> Iterator[tuple[str, ObjectLabel]]:
+        """What the page says of them."""
+        for history in self.seen:
+            numbers = [(f"force {x}", "N", v) for x, v in zip("xyz", history.force.T, strict=True)]
+            numbers += [
+                (f"moment {x}", "N m", v) for x, v in zip("xyz", history.moment.T, strict=True)
+            ]
+            nonzero = [number for number in numbers if number[2].any()]
+            labels = tuple((label, unit) for label, unit, _ in nonzero)
+            values = np.array([v for *_, v in nonzero]).reshape(len(nonzero), len(history.force)).T
+            end_text = f", at its {history.load.at}" if history.load.at else ""
+            text = (f'load on "{history.load.on}"{end_text}',)
+            yield (
+                f"loads/{history.load.name}",
+                ObjectLabel(history.load.name, text, np.zeros(3), labels, values),
+            )
+
+
+def _max_norm(vectors: Array) -> float:
+    return float(np.linalg.norm(np.nan_to_num(vectors), axis=1).max(initial=0.0))
+
+
+def _joined_arrows(name: str, drawn: list[tuple[Array, Faces]]) -> DeformingSurface:
+    starts = np.cumsum([0, *(vertices.shape[1] for vertices, _ in drawn)])
+    faces = [faces + start for (_, faces), start in zip(drawn, starts, strict=False)]
+    vertices = np.concatenate([np.nan_to_num(vertices) for vertices, _ in drawn], axis=1)
+    return DeformingSurface(name, vertices, np.concatenate(faces), _LOAD_COLOUR)
+
+
+def gravity_arrow(stage: SceneGraph, strength: float) -> tuple[Solid, ObjectLabel] | None:
+    """An arrow beside everything that is drawn, down; None without gravity (m/s2)."""
+    if not strength > 0:
+        return None
+    low, high = stage.corners()
+    up, size = stage.up, stage.size
+    horizontal_extent = np.abs(high - low) - np.abs(up) * np.abs(high - low)
+    direction = np.eye(3)[int(np.argmax(horizontal_extent))]
+    direction = direction - (direction @ up) * up
+    direction = direction / np.linalg.norm(direction)
+    cloud_distance = float(((stage.cloud - low) @ direction).min())
+    position = (low + high) / 2
+    position = (
+        position
+        + (cloud_distance - (position - low) @ direction - _GRAVITY_DISTANCE * size) * direction
+        + _GRAVITY_LENGTH / 2 * size * up
+    )
+    vertices, faces = arrows.straight_arrows(
+        position[None], -_GRAVITY_LENGTH * size * up[None], _GRAVITY_RADIUS * size
+    )
+    arrow = Solid("gravity", "arrow", Surface(vertices[0], faces), _GRAVITY_COLOUR)
+    return arrow, ObjectLabel(
+        "gravity", (f"{strength:.6g} m/s2",), position - _GRAVITY_LENGTH / 2 * size * up
+    )

@@ -1,0 +1,50 @@
+"""Several stages on one page, of which one is looked at at a time: modes, rows of a batch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TypeVar
+
+from .scene_graph import DeformingSurface, Line, SceneGraph, Solid
+
+Part = tuple[str, SceneGraph]
+T = TypeVar("T")
+
+
+def combine_stages(title: str, parts: Sequence[Part]) -> SceneGraph:
+    """Stages over the same moments as one; what belongs to each carries its name in front."""
+    first = parts[0][1]
+    notes = dict.fromkeys(note for _, stage in parts for note in stage.notes)
+    return replace(
+        first,
+        title=title,
+        notes=tuple(notes),
+        choices=tuple(name for name, _ in parts),
+        poses=dict(_with_prefix((name, stage.poses) for name, stage in parts)),
+        told=dict(_with_prefix((name, stage.told) for name, stage in parts)),
+        solids=tuple(
+            _solid_with_prefix(name, item) for name, stage in parts for item in stage.solids
+        ),
+        bent=tuple(_named_with_prefix(name, item) for name, stage in parts for item in stage.bent),
+        lines=tuple(
+            _named_with_prefix(name, item) for name, stage in parts for item in stage.lines
+        ),
+    )
+
+
+def _with_prefix(parts: Iterator[tuple[str, Mapping[str, T]]]) -> Iterator[tuple[str, T]]:
+    for name, values_by_owner in parts:
+        for owner, value in values_by_owner.items():
+            yield f"{name}/{owner}", value
+
+
+def _solid_with_prefix(name: str, one: Solid) -> Solid:
+    return replace(one, owner=f"{name}/{one.owner}")
+
+
+Moving = TypeVar("Moving", DeformingSurface, Line)
+
+
+def _named_with_prefix(name: str, one: Moving) -> Moving:
+    return replace(one, name=f"{name}/{one.name}")

@@ -1,0 +1,273 @@
+"""A run put on a stage: every body, hinge, spring and trail of it, over the moments of a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.numerics.rotations import IDENTITY
+from mstmm.scene import Body, Hinge, Spring, split_reference
+from mstmm.scene.validators.scalars_and_vectors import GROUND
+
+from . import body_geometry, flexible_geometry, hinge_glyphs, user_geometry
+from .frame_times import FrameTimes
+from .load_arrows import LoadArrows, gravity_arrow
+from .scene_graph import DeformingSurface, Line, ObjectLabel, Poses, SceneGraph, Solid
+from .solid_meshes import Colour, ellipsoid_surface
+
+if TYPE_CHECKING:
+    from ..result_record import Record
+
+#: Colours of bodies, one after another: apart for the colour-blind too, on white and on black.
+_BODY_COLOURS: tuple[Colour, ...] = (
+    (68, 119, 170), (204, 119, 68), (68, 150, 90), (170, 90, 150), (190, 170, 60), (90, 180, 190),
+    (190, 80, 90), (120, 130, 140),
+)  # fmt: skip
+_TRAIL_COLOUR: Colour = (150, 160, 175)
+
+#: Hinges of a scene of more are not drawn.
+_MAX_HINGES = 300
+#: Radius of a hinge's glyph, and of a foot, by that of the bars that it joins.
+_GLYPH_RADIUS_RATIO, _FOOT_RADIUS_RATIO = 1.6, 1.2
+#: Samples by which the size of the scene is taken.
+_MAX_SIZE_SAMPLES = 40
+
+
+def build_scene_graph(
+    run: Record,
+    title: str,
+    trails: Sequence[str] = (),
+    speed: float | None = None,
+    most: int | None = None,
+    when: FrameTimes | None = None,
+) -> SceneGraph:
+    """The stage of a run.  `trails`: ends whose ways are drawn; `speed`: seconds of the run per
+    second of film; `most`: pictures at most; `when`: moments of one's own in place of these.
+    SceneError for an end that there is not, and for a run without samples."""
+    return _SceneBuilder(run, trails, speed, most, when).stage(title)
+
+
+class _SceneBuilder:
+    def __init__(
+        self, run: Record, trails: Sequence[str], speed: float | None, most: int | None,
+        when: FrameTimes | None,
+    ) -> None:  # fmt: skip
+        self.run, self.scene = run, run.model.scene
+        self.skeleton = self.scene.skeleton
+        self.names = [self.skeleton.bodies.name(i) for i in range(len(self.skeleton.bodies))]
+        drawn = len(self.scene.hinges) <= _MAX_HINGES
+        self.hinges: Sequence[Hinge] = self.scene.hinges if drawn else ()
+        owners = len(self.names) + len(self.hinges)
+        self.when = when or FrameTimes.of(run, owners, speed, most)
+        self.trails = tuple(trails)
+        self.elastic = {body.name: body for body in self.scene.elastic if body.name in self.names}
+        run._observed.fetch(self.names)
+        self.poses = {f"bodies/{name}": self.when.poses(run, name) for name in self.names}
+        self.size = self._size()
+        self.radius = body_geometry.bar_radius(self.size, self.size)
+        self.acting = LoadArrows(run, self.when, self.size)
+        self.notes = () if drawn else (f"more than {_MAX_HINGES} hinges: they are not drawn",)
+
+    def stage(self, title: str) -> SceneGraph:
+        solids = [*self._shapes(), *self._rigid(), *self._joints(), *self._feet()]
+        self.poses |= dict(self.acting.poses())
+        scene_graph = SceneGraph(
+            title=title, times=self.when.times, speed=self.when.speed, up=self._up(),
+            poses=self.poses, solids=tuple(solids),
+            bent=(*self._bent(), *self.acting.bent()),
+            lines=(*self._coils(), *self._ways()),
+            told=dict([*self._told(), *self.acting.told()]), notes=self.notes,
+        )  # fmt: skip
+        gravity_objects = gravity_arrow(scene_graph, float(np.linalg.norm(self.scene.gravity)))
+        if gravity_objects is None:
+            return scene_graph
+        arrow, told = gravity_objects
+        return replace(
+            scene_graph,
+            solids=(*scene_graph.solids, arrow),
+            told={**scene_graph.told, arrow.owner: told},
+        )
+
+    # --- what is there ----------------------------------------------------------------------------
+
+    def _size(self) -> float:
+        """The diagonal (m) of the box that holds origins and ends of all bodies."""
+        frames = np.unique(np.linspace(0, len(self.when.times) - 1, _MAX_SIZE_SAMPLES).astype(int))
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        for name, body in zip(self.names, self.skeleton.bodies, strict=True):
+            pose = self.poses[f"bodies/{name}"]
+            ends = np.array([(0.0, 0.0, 0.0), *(body.end_position(end) for end in body.ends)])
+            positions = Poses(pose.position[frames], pose.quaternion[frames]).of(ends)
+            if name in self.elastic:
+                positions = np.stack([trail[frames] for trail in self._ways_of(name)], axis=1)
+            low = np.minimum(low, positions.min(axis=(0, 1)))
+            high = np.maximum(high, positions.max(axis=(0, 1)))
+        for hinge in self._held():
+            position = np.array(hinge.position)
+            low, high = np.minimum(low, position), np.maximum(high, position)
+        size = float(np.linalg.norm(high - low)) if len(self.names) else 1.0
+        return size if size > 0 else 1.0
+
+    def _up(self) -> Array:
+        gravity = np.array(self.scene.gravity)
+        strength = float(np.linalg.norm(gravity))
+        return -gravity / strength if strength > 0 else np.array([0.0, 0.0, 1.0])
+
+    def _colour(self, name: str) -> Colour:
+        return _BODY_COLOURS[self.names.index(name) % len(_BODY_COLOURS)]
+
+    def _rigid(self) -> Iterator[Solid]:
+        flexible_bodies = self.run.model.flexible
+        names_with_geometry = {
+            name for name, body in flexible_bodies.items() if body.shapes or body.skin
+        }
+        names_with_geometry |= {shape.owner for shape in self.scene.shape}
+        hinged_references = {hinge.inboard for hinge in self.scene.hinges}
+        hinged_references |= {hinge.outboard for hinge in self.scene.hinges}
+        for i, (name, body) in enumerate(zip(self.names, self.skeleton.bodies, strict=True)):
+            if name not in names_with_geometry:
+                colour = _BODY_COLOURS[i % len(_BODY_COLOURS)]
+                yield from body_geometry.rigid_body_solids(
+                    name, body, name in hinged_references, self.size, colour
+                )
+
+    def _shapes(self) -> Iterator[Solid]:
+        """Every shape of the scene: such a body is drawn by its shapes alone."""
+        saved_files = self.run.meshes
+        for shape in self.scene.shape:
+            if shape.is_on_ground:
+                yield user_geometry.shape_solid(
+                    shape, (0.0, 0.0, 0.0), IDENTITY, hinge_glyphs.GROUND_COLOUR, saved_files
+                )
+                continue
+            number = self.skeleton.bodies.find(shape.owner)
+            assert number is not None
+            body, end = self.skeleton.bodies[number], split_reference(shape.on)[1]
+            position, axes = body.end_position(end), body.end_rotation(end)
+            colour = _BODY_COLOURS[number % len(_BODY_COLOURS)]
+            yield user_geometry.shape_solid(shape, position, axes, colour, saved_files)
+
+    def _bent(self) -> Iterator[DeformingSurface]:
+        shaped = {shape.owner for shape in self.scene.shape}
+        for name, body in self.run.model.flexible.items():
+            pose, colour = self.poses[f"bodies/{name}"], self._colour(name)
+            if body.shapes is not None:
+                yield flexible_geometry.beam_tube(
+                    self.run, name, self.when, pose, self.size, colour
+                )
+            elif body.skin is not None and name not in shaped:
+                r = 0.3 * self.radius
+                yield flexible_geometry.elastic_surface(self.run, name, self.when, pose, r, colour)
+
+    def _joints(self) -> Iterator[Solid]:
+        for hinge in self.hinges:
+            surface = hinge_glyphs.hinge_glyph(hinge, _GLYPH_RADIUS_RATIO * self._girth(hinge))
+            if surface is not None:
+                owner = f"hinges/{hinge.name}"
+                self.poses[owner] = self._axes_of(hinge)
+                yield Solid(owner, "glyph", surface, hinge_glyphs.HINGE_COLOUR)
+        for force in self.scene.bushing:
+            owner = f"bushings/{force.name}"
+            reference = force.from_ if split_reference(force.to)[0] == GROUND else force.to
+            self.poses[owner] = self.when.poses(self.run, reference)
+            r = _GLYPH_RADIUS_RATIO * self.radius
+            yield Solid(
+                owner, "glyph", ellipsoid_surface((r, r, 0.6 * r), 10), hinge_glyphs.SPRING_COLOUR
+            )
+
+    def _axes_of(self, hinge: Hinge) -> Poses:
+        """Where a glyph is: with the outboard end; the rail of what slides alone stays behind."""
+        outer = self.when.poses(self.run, hinge.outboard)
+        if hinge.facts is None or hinge.facts.turns or not hinge.facts.slides:
+            return outer
+        if hinge.inboard_body == GROUND:
+            start = np.tile(np.array(hinge.position), (len(self.when.times), 1))
+        else:
+            start = self.when.poses(self.run, hinge.inboard).position
+        return Poses(start, outer.quaternion)
+
+    def _held(self) -> Iterator[Hinge]:
+        """Hinges that hold something to the ground."""
+        for hinge in self.hinges:
+            free = hinge.facts is not None and hinge.facts.free_body
+            if hinge.inboard_body == GROUND and not free:
+                yield hinge
+
+    def _girth(self, hinge: Hinge) -> float:
+        """Radius in m of the thinner of the two bodies that a hinge joins."""
+        radii = [self.radius]
+        for name in (hinge.inboard_body, hinge.outboard_body):
+            number = self.skeleton.bodies.find(name)
+            if number is not None:
+                radii.append(body_geometry.body_bar_radius(self.skeleton.bodies[number], self.size))
+        return min(radii)
+
+    def _feet(self) -> Iterator[Solid]:
+        radii_by_position = {hinge.position: self._girth(hinge) for hinge in self._held()}
+        for number, (at, girth) in enumerate(radii_by_position.items(), 1):
+            foot = hinge_glyphs.ground_block(np.array(at), _FOOT_RADIUS_RATIO * girth)
+            yield Solid(foot.owner, f"{number}", foot.surface, foot.colour)
+
+    # --- lines ------------------------------------------------------------------------------------
+
+    def _coils(self) -> Iterator[Line]:
+        for spring in self.scene.spring:
+            start, end = self._place(spring, spring.from_), self._place(spring, spring.to)
+            points = hinge_glyphs.spring_coil(start, end, _GLYPH_RADIUS_RATIO * self.radius)
+            yield Line(f"springs/{spring.name}", points, hinge_glyphs.SPRING_COLOUR)
+
+    def _ways_of(self, name: str) -> list[Array]:
+        """(f, 3) where the ends of an elastic body are, each over the moments."""
+        ends = self.elastic[name].ends
+        return [self.when.poses(self.run, f"{name}.{end}").position for end in ends]
+
+    def _place(self, spring: Spring, reference: str) -> Array:
+        """(f, 3) where an end of a spring is."""
+        if split_reference(reference)[0] == GROUND:
+            return np.tile(np.array(spring.position), (len(self.when.times), 1))
+        return self.when.poses(self.run, reference).position
+
+    def _ways(self) -> Iterator[Line]:
+        for reference in self.trails:
+            if split_reference(reference)[0] == GROUND:
+                raise SceneError(f'trail of "{reference}": the ground does not move; name an end')
+            way = self.when.way(self.run, reference)
+            yield Line(f"trails/{reference}", way[None], _TRAIL_COLOUR, 2.0)
+
+    def _centre(self, name: str, body: Body) -> Array:
+        """Where a body is pointed at, in its axes."""
+        flexible_body = self.run.model.flexible.get(name)
+        if flexible_body is None or not flexible_body.ports:
+            return body_geometry.body_centre(body)
+        return np.mean([port.position for port in flexible_body.ports.values()], axis=0)
+
+    # --- what the page says -----------------------------------------------------------------------
+
+    def _told(self) -> Iterator[tuple[str, ObjectLabel]]:
+        for name, body in zip(self.names, self.skeleton.bodies, strict=True):
+            text = (
+                (f"mass {body.mass:g} kg",)
+                if name not in self.run.model.flexible
+                else ("flexible",)
+            )
+            pose = self.poses[f"bodies/{name}"]
+            labels = (("x", "m"), ("y", "m"), ("z", "m"))
+            centre = self._centre(name, body)
+            positions = pose.of(centre[None])[:, 0]
+            lines = (*text, "its mass centre is at" if body.mass else "its middle is at")
+            yield f"bodies/{name}", ObjectLabel(name, lines, centre, labels, positions)
+        for hinge in self.hinges:
+            if f"hinges/{hinge.name}" in self.poses:
+                slots = self.run.layout(hinge.name)
+                q = self.run.coordinate(hinge.name)
+                coordinates = tuple(zip(slots.q_names, slots.q_units, strict=True))
+                values = self.when.straight(q[self.when.kept])
+                yield (
+                    f"hinges/{hinge.name}",
+                    ObjectLabel(hinge.name, (hinge.type,), np.zeros(3), coordinates, values),
+                )

@@ -1,0 +1,85 @@
+"""Expressions of a scene over a run: efforts of laws, components of loads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.expression.inputs import INPUTS
+from mstmm.numerics.piecewise_polynomial import NUMBERS_PER_PIECE
+
+from ...engine.engine_calls import Probe
+from ...kernels import numpy_kernels
+from ...packing.system import System
+
+if TYPE_CHECKING:
+    from ..observations import Observations
+
+_IDENTITY_AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+#: Numbers of the motion of all loads together, about 130 MB.
+MAX_MOTION_NUMBERS = 2**24
+
+
+class AppliedLoads:
+    """Expression values at all samples, computed on first use and cached."""
+
+    def __init__(self, observed: Observations) -> None:
+        self.observed = observed
+        self.system: System = observed.engine.packed.system
+
+    @cached_property
+    def given(self) -> dict[str, Array]:
+        """What every expression reads: t, q, u and the inputs, those that are held from memory."""
+        run, held = self.observed.run, self.system.held
+        inputs = np.array([self.system.inputs_at(t) for t in run.t.tolist()])
+        inputs = inputs.reshape(len(run.t), NUMBERS_PER_PIECE * len(self.system.inputs))
+        for k, slot in enumerate(held.places):
+            if slot >= 0:
+                inputs[:, NUMBERS_PER_PIECE * k : NUMBERS_PER_PIECE * (k + 1)] = 0.0
+                inputs[:, NUMBERS_PER_PIECE * k + 1] = run.memory[:, slot]
+        return {"t": run.t[:, None], "q": run.q, "u": run.u, INPUTS: inputs}
+
+    @cached_property
+    def _values(self) -> Array:
+        kernel = self.system.values
+        assert kernel is not None
+        return numpy_kernels.evaluate(kernel, self.given)["values"]
+
+    @cached_property
+    def _loads(self) -> Array | None:
+        """(n, 2 loads, 24): of each load the motion of its point, and of its axes; None where this
+        would be too large."""
+        probes = [probe for number in range(len(self.system.loads)) for probe in self._pair(number)]
+        is_small = len(self.observed.run.t) * 24 * len(probes) <= MAX_MOTION_NUMBERS
+        return self._seen(probes) if is_small else None
+
+    def load(self, number: int) -> tuple[Array, Array]:
+        """(n, 24) twice: motion of the point of a load and of its axes, see `Observation`."""
+        motions, first = self._loads, 2 * number
+        if motions is None:
+            motions, first = self._seen(self._pair(number)), 0
+        return motions[:, first], motions[:, first + 1]
+
+    def _pair(self, number: int) -> tuple[Probe, Probe]:
+        load = self.system.loads[number]
+        axes = load.axes_own if load.axes >= 0 else _IDENTITY_AXES
+        return Probe(load.body, _IDENTITY_AXES, load.offset), Probe(
+            load.axes, axes, (0.0, 0.0, 0.0)
+        )
+
+    def _seen(self, probes: Sequence[Probe]) -> Array:
+        run, engine = self.observed.run, self.observed.engine
+        return engine.observe(run.t, run.q, run.u, run.memory, probes, ("points",)).points
+
+    def at(self, places: tuple[int, ...]) -> Array:
+        """(n, places): the values at some places, 0 at place -1."""
+        result = np.zeros((len(self.observed.run.t), len(places)))
+        for k, slot in enumerate(places):
+            if slot >= 0:
+                result[:, k] = self._values[:, slot]
+        return result

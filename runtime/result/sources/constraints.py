@@ -1,0 +1,92 @@
+"""Constraints and couplings over a run: loads on the constrained bodies and speeds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.scene.tables.closures import CURVE, DISTANCE, ROLLING
+from mstmm.scene.validators.scalars_and_vectors import GROUND
+
+from ...engine.observation_columns import XYZ, QuantityKind
+from ...packing.coordinate_layout import OF_CONSTRAINT
+from ..quantity_names import Table
+
+if TYPE_CHECKING:
+    from mstmm.scene import Constraint
+
+    from ..observations import Observations
+
+_FORCE = QuantityKind("N", "force on the end `to`", XYZ, ())
+
+
+def add_constraint(table: Table, observed: Observations, one: Constraint) -> None:
+    """Its quantities under their names: rod.force, rod.load, road.friction, wire.s."""
+    name, owner = one.name, f"constraint {one.name}"
+
+    def force() -> Array:
+        return _constraint_force(observed, one)
+
+    def load() -> Array:
+        return np.asarray(np.einsum("ni,ni->n", force(), _load_direction(observed, one)))
+
+    def friction() -> Array:
+        normal_force = load()[:, None] * _load_direction(observed, one)
+        return np.asarray(np.linalg.norm(force() - normal_force, axis=1))
+
+    table.vector(f"{name}.force", owner, _FORCE, force)
+    if one.type == CURVE:
+        packed = observed.engine.packed
+        column = int(packed.system.places["q"][packed.hinge_position[_frame_hinge_name(one)]])
+        table.scalar(
+            f"{name}.s", "", "parameter of the curve", lambda: observed.run.q[:, column],
+            owner=owner,
+        )  # fmt: skip
+        return
+    meaning = "which pushes the ends apart" if one.type == DISTANCE else "along the normal"
+    table.scalar(f"{name}.load", "N", f"load, {meaning},", load, owner=owner)
+    if one.type == ROLLING:
+        table.scalar(f"{name}.friction", "N", "friction against slip", friction, owner=owner)
+
+
+def add_coupling(table: Table, observed: Observations, name: str) -> None:
+    """Its load: what it puts on a coordinate, for a slope of one of its expression by that."""
+    loops = observed.engine.packed.written.loops
+    rows = [] if loops is None else [x.row for x in loops.couplings if x.coupling.name == name]
+
+    def load() -> Array:
+        row_loads = observed.part("rows")
+        return -row_loads[:, rows[0]] if rows else np.zeros(len(row_loads))
+
+    meaning = "load, by the slopes of its expression,"
+    table.scalar(f"{name}.load", "", meaning, load, owner=f"coupling {name}")
+
+
+def _frame_hinge_name(one: Constraint) -> str:
+    return one.name + OF_CONSTRAINT
+
+
+def _constraint_force(observed: Observations, one: Constraint) -> Array:
+    """(n, 3), inertial axes."""
+    hinge_index = observed.engine.packed.hinge_position[_frame_hinge_name(one)]
+    return observed.columns("loads", (hinge_index, slice(0, 3)))
+
+
+def _load_direction(observed: Observations, one: Constraint) -> Array:
+    """(n, 3) along the load, inertial axes: of a distance from `from` to `to`."""
+    if one.type == DISTANCE:
+        difference = _end_position(observed, one, one.to) - _end_position(observed, one, one.from_)
+        return np.asarray(difference / np.linalg.norm(difference, axis=1)[:, None])
+    normal = one.unit_normal
+    assert normal is not None
+    if one.from_ == GROUND:
+        return np.tile(np.asarray(normal), (len(observed.run.t), 1))
+    return np.asarray(observed.points(one.from_)[:, 15:24].reshape(-1, 3, 3) @ np.asarray(normal))
+
+
+def _end_position(observed: Observations, one: Constraint, end: str) -> Array:
+    if end == GROUND:
+        return np.tile(np.asarray(one.position), (len(observed.run.t), 1))
+    return observed.points(end)[:, :3]

@@ -1,0 +1,93 @@
+"""Loads of contacts that can only push: those of bodies that roll on a plane.
+
+Stops push by their law, and bounces by blows; a rolling constraint keeps its disc on the plane in
+both directions, so that the sign of its normal load has to be looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.risk import Risk
+from mstmm.scene.tables.closures import ROLLING
+
+if TYPE_CHECKING:
+    from mstmm.scene import Constraint
+
+    from ..result_record import Record
+
+#: Parts of the largest load, and of the kinetic energy over the radius, up to which a load that
+#: pulls is rounding.
+_LOAD_ROUNDING, _ENERGY_ROUNDING = 1e-6, 1e-9
+
+#: Name of the row of a rolling constraint that carries its normal load.
+_NORMAL_ROW = "normal"
+
+_REMEDY = (
+    "use the run up to there; what may lift off needs a stop that pushes alone (law.limits with a "
+    "stiffness)"
+)
+
+
+def find_pulling_contacts(result: Record) -> Iterator[Risk]:
+    """A risk for each rolling constraint whose normal load pulls in a sample of the run.
+
+    Loads that rigid bodies leave open are judged by their sum; that their share pulls is advice.
+    """
+    model = result.model
+    rolling = [constraint for constraint in model.scene.constraint if constraint.type == ROLLING]
+    if not rolling or model.closed is None or not len(result.t):
+        return
+    shares = model.closed.loops.not_unique
+    is_open = {
+        constraint.name: _NORMAL_ROW in shares.get(constraint.name, ()) for constraint in rolling
+    }
+    loads = {
+        constraint.name: result.quantity(f"{constraint.name}.load").values for constraint in rolling
+    }
+    total = np.sum([loads[name] for name in loads if is_open[name]], axis=0)
+    for constraint in rolling:
+        bound = _load_rounding(result, constraint, loads)
+        if not is_open[constraint.name]:
+            yield from _pulling_risk(result.t, constraint.name, loads[constraint.name], bound)
+        elif (total < -bound).any():
+            yield from _pulling_risk(
+                result.t, constraint.name, total, bound, "the sum of the normal loads"
+            )
+        else:
+            yield from _pulling_risk(
+                result.t, constraint.name, loads[constraint.name], bound,
+                "its normal load, one of many shares that rigid bodies leave open,", False,
+            )  # fmt: skip
+
+
+def _load_rounding(result: Record, one: Constraint, loads: dict[str, Array]) -> float:
+    """Size of a load (N) that is rounding."""
+    energy = result.quantity("energy.kinetic").values
+    largest = max(float(np.nanmax(np.abs(load), initial=0.0)) for load in loads.values())
+    assert one.radius is not None
+    return (
+        _LOAD_ROUNDING * largest
+        + _ENERGY_ROUNDING * float(np.nanmax(energy, initial=0.0)) / one.radius
+    )
+
+
+def _pulling_risk(
+    t: Array, name: str, load: Array, bound: float, what: str = "its normal load",
+    doubt: bool = True,
+) -> Iterator[Risk]:  # fmt: skip
+    """The risk of a contact with this load (n,) in N, where that pulls by more than `bound`."""
+    pulls = load < -bound
+    if not pulls.any():
+        return
+    first, worst = int(np.argmax(pulls)), int(np.nanargmin(load))
+    yield Risk(
+        "pulling-contact", f'constraint "{name}"',
+        f'constraint "{name}" pulls from t = {t[first]:.6g} s on, where a contact would lift off: '
+        f"{what} falls to {load[worst]:.3g} N at t = {t[worst]:.6g} s", _REMEDY,
+        float(load[worst]), 0.0, "N", doubt,
+    )  # fmt: skip

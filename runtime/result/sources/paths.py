@@ -1,0 +1,178 @@
+"""Variables of expressions along a run: coordinates, speeds, lengths of springs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mstmm.array_validation import Array, Integers
+from mstmm.expression.expression import Name
+
+from ...discontinuities.active_expressions import ActiveExpression
+from ...discontinuities.interval_arithmetic import Interval
+from ...discontinuities.interval_enclosures import TIME, Enclosure
+from ...engine.engine_calls import Probe
+
+if TYPE_CHECKING:
+    from mstmm.scene import Hinge
+
+    from ...engine.compiled_scene import CompiledScene
+
+#: A cubic with slopes r at the ends of h leaves its chord by max |r - chord| h / 4, and its slope
+#: those three by half their spread; the rest is room for higher orders.
+_HIGHER_ORDER_MARGIN = 1.5
+
+
+@dataclass(frozen=True)
+class RunStates:
+    """Times (n,), ascending, states and memory of a run at its steps, or at some of them."""
+
+    t: Array
+    q: Array
+    u: Array
+    memory: Array
+
+
+@dataclass(frozen=True)
+class SampledVariable:
+    """A number along a run: its values (n,) at the states, and its rates (n,) there."""
+
+    values: Array
+    rates: Array
+
+
+def sampled_variables(
+    model: CompiledScene, states: RunStates, one: ActiveExpression, own: Hinge | None
+) -> dict[str, SampledVariable] | None:
+    """What the names of an expression are along a run, by their text; None where one of them is
+    not known."""
+    constants = dict(one.constants)
+    length = None if one.spring is None else _spring_length(model, states, one)
+    variables = dict[str, SampledVariable]()
+    for name in one.expression.names:
+        if name.text in constants or (own is not None and name.text in own.parameters):
+            continue
+        course = _sampled_variable(model, states, name, own, length)
+        if course is None:
+            return None
+        variables[name.text] = course
+    return variables
+
+
+def _sampled_variable(
+    model: CompiledScene,
+    states: RunStates,
+    name: Name,
+    own: Hinge | None,
+    length: SampledVariable | None,
+) -> SampledVariable | None:
+    if name.text == TIME:
+        return SampledVariable(states.t, np.ones(len(states.t)))
+    if name.text in model.packed.channels:
+        return _sampled_input(model, states, name.text)
+    if length is not None and name.text in ("q", "u"):
+        return length if name.text == "q" else _with_parabola_rates(states.t, length.rates)
+    hinge = name.hinge or ("" if own is None else own.name)
+    if name.quantity not in ("q", "u") or not hinge:
+        return None
+    slots, index = model.layout.hinges[hinge], name.index or 0
+    if name.quantity == "u":
+        return _with_parabola_rates(states.t, states.u[:, slots.u + index])
+    values = states.q[:, slots.q + index]
+    return (
+        SampledVariable(values, states.u[:, slots.u + index])
+        if slots.straight
+        else _with_parabola_rates(states.t, values)
+    )
+
+
+def _with_parabola_rates(t: Array, values: Array) -> SampledVariable:
+    """With rates from parabolas through neighbours."""
+    if len(t) < 3:
+        return SampledVariable(values, np.full(len(t), (values[-1] - values[0]) / (t[-1] - t[0])))
+    return SampledVariable(values, np.gradient(values, t, edge_order=2))
+
+
+def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> SampledVariable:
+    """An input or signal; one that is held stands still in every step."""
+    slot = model.packed.system.held.places[list(model.packed.channels).index(name)]
+    if slot >= 0:
+        return SampledVariable(states.memory[:, slot], np.zeros(len(states.t)))
+    channel = model.packed.channels[name]
+    return _with_parabola_rates(states.t, np.array([channel.value(t) for t in states.t.tolist()]))
+
+
+def _spring_length(
+    model: CompiledScene, states: RunStates, one: ActiveExpression
+) -> SampledVariable:
+    """Length of the spring of an expression (m) and its rate (m/s)."""
+    engine, spring = model.looped, one.spring
+    assert spring is not None
+    probes = []
+    for reference in (spring.from_, spring.to):
+        body, axes, offset = engine.packed.end(reference)
+        probes.append(Probe(body, axes, spring.position if body < 0 else offset))
+    observation = engine.observe(
+        states.t, states.q.copy(), states.u.copy(), states.memory.copy(), probes, parts=("points",)
+    )
+    difference = observation.points[:, 1, 0:3] - observation.points[:, 0, 0:3]
+    relative_velocity = observation.points[:, 1, 3:6] - observation.points[:, 0, 3:6]
+    length = np.linalg.norm(difference, axis=1)
+    return SampledVariable(
+        length, (difference * relative_velocity).sum(axis=1) / np.where(length > 0, length, 1.0)
+    )
+
+
+def make_enclosures(
+    t: Array, known: Mapping[str, SampledVariable], names: Sequence[str]
+) -> Callable[[Interval], Mapping[str, Enclosure]]:
+    """Enclosures of names over cells of time (s), none of which lies across one of the times t
+    (n,): those of cubics between the states, with some room."""
+
+    def leaves(cells: Interval) -> dict[str, Enclosure]:
+        lo, hi = np.broadcast_arrays(cells.lo, cells.hi)
+        step = np.clip(np.searchsorted(t, lo, side="right") - 1, 0, len(t) - 2)
+        return {name: _enclosure_in_steps(t, known[name], step, lo, hi) for name in names}
+
+    return leaves
+
+
+def _enclosure_in_steps(
+    t: Array, course: SampledVariable, step: Integers, lo: Array, hi: Array
+) -> Enclosure:
+    h = t[step + 1] - t[step]
+    values = course.values[step], course.values[step + 1]
+    rates = course.rates[step], course.rates[step + 1]
+    (a, rate_a), (b, rate_b) = (
+        _cubic_value_and_slope((end_time - t[step]) / h, h, *values, *rates)
+        for end_time in (lo, hi)
+    )
+    width = hi - lo
+    chord = np.divide(b - a, width, out=np.copy(rate_a), where=width > 0)
+    value_margin = (
+        0.25
+        * _HIGHER_ORDER_MARGIN
+        * width
+        * np.maximum(np.abs(rate_a - chord), np.abs(rate_b - chord))
+    )
+    low, high = (
+        np.minimum.reduce([rate_a, rate_b, chord]),
+        np.maximum.reduce([rate_a, rate_b, chord]),
+    )
+    spread = 0.5 * _HIGHER_ORDER_MARGIN * (high - low)
+    value = Interval(np.minimum(a, b) - value_margin, np.maximum(a, b) + value_margin)
+    return Enclosure(value, Interval(low - spread, high + spread))
+
+
+def _cubic_value_and_slope(
+    x: Array, h: Array, a: Array, b: Array, rate_a: Array, rate_b: Array
+) -> tuple[Array, Array]:
+    """Value and slope at x, 0 to 1, of a cubic over h by its values and slopes at both ends."""
+    chord = (b - a) / h
+    left, right = rate_a - chord, chord - rate_b
+    value = a + x * (b - a) + h * x * (1 - x) * ((1 - x) * left + x * right)
+    slope = chord + (1 - x) * (1 - 3 * x) * left + x * (2 - 3 * x) * right
+    return np.asarray(value), np.asarray(slope)

@@ -1,0 +1,94 @@
+"""How the steps of a run were controlled: how well it can be expected to keep energy and momentum,
+and which control would keep them better.
+
+Control of local errors lets energy drift by up to nine times the tolerance, and motions err by four
+to sixty times the drift, relative to what moves; both counted on the runs of
+benchmarks/risk_checks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..integrate.achieved_error import AchievedError
+from ..integrate.settings import Settings
+from ..integrate.steppers import get, names
+from .verdict import DEFAULT_ACCURACY, DEFAULT_DRIFT
+
+#: Drift beyond which energy and momentum are not kept, whatever was asked: what moves errs by about
+#: ACCURACY.
+MAX_DRIFT = DEFAULT_ACCURACY / 20
+
+#: Drift that control of local errors leaves, in tolerances.
+_DRIFT_PER_TOLERANCE = 10.0
+
+#: What is named instead is to leave this part of the bound.
+_SAFETY_FACTOR = 0.2
+
+#: Drifts fall by less than the order of a method while steps are long: by this part of it, and by
+#: no more than the second.
+_ORDER_REDUCTION, _MAX_DRIFT_ORDER = 0.75, 4.0
+
+#: Tolerances below this are rounding.
+_MIN_TOLERANCE = 1e-13
+
+#: Order of methods that have no tableau.
+_DEFAULT_ORDER = 2
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """Fixed steps of a method of an order, or tolerances, or an error that was asked for.
+
+    Attributes:
+        step: s; None for steps that the method chose.
+        rtol, atol: its tolerances.
+        order: of the method.
+        asked: error that was wanted of the whole run, in parts or rad; 0 where in other units, None
+            where none was.
+    """
+
+    step: float | None
+    rtol: float
+    atol: float
+    order: int
+    asked: float | None = None
+
+    @property
+    def bound(self) -> float:
+        """Largest relative drift of energy and momentum that counts as conserved."""
+        if self.asked is not None:
+            return max(DEFAULT_DRIFT, self.asked)
+        return MAX_DRIFT if self.step is not None else _drift_bound(max(self.rtol, self.atol))
+
+    def finer(self, drift: float) -> str:
+        """Advice on step or tolerances for a relative drift that is too large."""
+        if self.step is not None:
+            order = min(_ORDER_REDUCTION * self.order, _MAX_DRIFT_ORDER)
+            shorter = self.step * (_SAFETY_FACTOR * self.bound / drift) ** (1 / order)
+            return f"take a step below {shorter:.2g} s, or a method that chooses its steps"
+        drift_ratio = drift / max(self.rtol, self.atol)
+        is_expected = drift_ratio <= _SAFETY_FACTOR * _DRIFT_PER_TOLERANCE and self.asked is None
+        reduction = _SAFETY_FACTOR * (MAX_DRIFT if is_expected else DEFAULT_DRIFT) / drift
+        if self.asked:
+            return f"ask for an error below {reduction * self.asked:.1g}"
+        if reduction * self.rtol < _MIN_TOLERANCE:
+            return "look for efforts, loads or drives that jump or go to infinity"
+        return (
+            f"take rtol = {reduction * self.rtol:.1g} and atol = {reduction * self.atol:.1g}, "
+            f"or less"
+        )
+
+
+def _drift_bound(tolerance: float) -> float:
+    return min(max(DEFAULT_DRIFT, _DRIFT_PER_TOLERANCE * tolerance), MAX_DRIFT)
+
+
+def step_control(settings: Settings, reached: AchievedError | None) -> StepControl:
+    """Step control of a run."""
+    has_tableau = settings.method in names()
+    order = get(settings.method).order if has_tableau else _DEFAULT_ORDER
+    target_error = None
+    if reached is not None:
+        target_error = reached.asked if reached.unit in ("1", "rad") else 0.0
+    return StepControl(settings.step, settings.rtol, settings.atol, order, target_error)

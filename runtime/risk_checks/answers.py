@@ -1,0 +1,66 @@
+"""Checks of answers that are no runs: equilibria, assemblies, linear models and what they give.
+
+An answer about a state is examined as a run that takes no time there, by the checks that runs have;
+what is peculiar to linear models is added by `runtime/linear/validity.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from mstmm.array_validation import Array
+from mstmm.risk import Risk
+
+from ..integrate.settings import Settings
+from ..result.factory import result_of
+from .driven_path import states
+from .pre_run import check_before_run
+
+if TYPE_CHECKING:
+    from ..engine.compiled_scene import CompiledScene
+
+_STEPS = "an answer about a state takes no steps"
+_TIME = "an answer about a state covers no time"
+
+#: Risks of runs that answers about a state are not examined for, and why.
+NOT_APPLICABLE = {
+    "step-stability": _STEPS,
+    "step-accuracy": _STEPS,
+    "stiff": _STEPS,
+    "quaternion-length": _STEPS,
+    "wanted-error": _STEPS,
+    "narrow-load": _TIME,
+    "pole": _TIME,
+    "switches": _TIME,
+    "chatter": _TIME,
+    "energy-drift": _TIME,
+    "momentum-drift": _TIME,
+    "one-way-loads": _TIME,
+    "one-way-blow": _TIME,
+    "one-way-release": _TIME,
+}
+
+
+def find_state_risks(model: CompiledScene, t: float, q: Array, u: Array) -> tuple[Risk, ...]:
+    """Risks of the state q (nq,), u (nu,) at t (s): of its models, its sweep and its loops."""
+    settings = Settings(t, t)
+    start = check_before_run(model, settings, q, u)
+    return result_of(model, start.given(states(model, settings, q, u, [t]), q, u)).risks
+
+
+def merge_over_values(
+    parameter: str, found: Sequence[tuple[float, Iterable[Risk]]]
+) -> Iterator[Risk]:
+    """Risks over the values of a parameter: of each kind and element the one with the largest
+    figure, which says at which value and at how many others."""
+    groups = dict[tuple[str, str], list[tuple[float, Risk]]]()
+    for value, risks in found:
+        for risk in risks:
+            groups.setdefault((risk.name, risk.element), []).append((value, risk))
+    for rows in groups.values():
+        value, worst = max(rows, key=lambda row: (row[1].doubt, abs(row[1].figure or 0.0)))
+        others = len({one for one, _ in rows}) - 1
+        where = f"at {parameter} = {value:g}" + (f" and {others} other values" if others else "")
+        yield replace(worst, means=f"{where}: {worst.means}")

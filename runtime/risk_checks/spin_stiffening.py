@@ -1,0 +1,53 @@
+"""Linear flexible bodies that will be spun: by their start, and by drives over the whole run.
+
+In the axes of a linear beam spin takes of its stiffness what shortening would more than give back;
+of a clamped one in the plane of its spin about (spin / first frequency)^2 (Kane, Ryan, Banerjee,
+Journal of Guidance, Control, and Dynamics 10, 1987).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from mstmm.array_validation import Array
+from mstmm.risk import Risk
+
+from ..result.flexible.body_motions import FlexibleBodies
+from ..result.flexible.modal_energy import modal_frequencies
+from ..result.flexible.range_estimators import has_second_order_terms, transverse_spin
+from ..result.flexible.risks import MAX_LOAD_RATIO
+from ..result.observations import Observations
+from .driven_path import states, times
+
+if TYPE_CHECKING:
+    from ..engine.compiled_scene import CompiledScene
+    from ..integrate.settings import Settings
+
+
+def has_linear_bodies(model: CompiledScene) -> bool:
+    """Whether there are any."""
+    return bool(_linear(model))
+
+
+def _linear(model: CompiledScene) -> list[str]:
+    return [name for name, body in model.flexible.items() if not has_second_order_terms(body)]
+
+
+def spin_stiffening_risks(
+    model: CompiledScene, settings: Settings, q: Array, u: Array
+) -> Iterator[Risk]:
+    """Those whose stiffness a spin that is known before the run changes by more than GAMMA."""
+    moved = states(model, settings, q, u, times(model, settings))
+    bodies = FlexibleBodies(model, Observations(model, moved))
+    for name in _linear(model):
+        first = float(modal_frequencies(model.flexible[name])[0])
+        spin = transverse_spin(bodies.motion(name))
+        ratio = spin / first if first > 0 else 0.0
+        if ratio**2 > MAX_LOAD_RATIO:
+            yield Risk(
+                "stiffening", f'"{name}"',
+                f'"{name}" has no geometric stiffening and will spin at {ratio:.2g} times its '
+                f"first frequency: its stiffness errs by about {min(ratio**2, 9.99):.0%}",
+                "leave stiffening on", ratio, MAX_LOAD_RATIO**0.5, before=True,
+            )  # fmt: skip

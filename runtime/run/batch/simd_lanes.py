@@ -1,0 +1,136 @@
+"""Trajectories in the lanes of vectors, on threads: a thin hold on `integrate/c/simd_lanes.c`."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mstmm.array_validation import Array
+from mstmm.errors import SceneError
+from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
+
+from ...engine.live_inputs import LiveInputs, Places
+from ...engine.looped_engine import LoopedEngine
+from ...integrate.c_loop import Status
+from ...integrate.c_tableau import c_tableau
+from ...integrate.settings import Settings
+from ...integrate.steppers import get
+from ...kernels.fused_library import FusedLibrary
+from ...packing.records.memory import Memory
+from ...packing.records.model_record import write_inputs
+from ..integration_run import SLICE
+from ..scene_system import SceneSystem
+from .interruptible_threads import on_threads
+
+
+class LaneInputs:
+    """Inputs of every trajectory as compiled code reads them: what stands still in its row of
+    `numbers` (n, np), which is filled in, the others as records."""
+
+    def __init__(
+        self,
+        engine: LoopedEngine,
+        read: Places,
+        channels: Sequence[Sequence[PiecewisePolynomial]],
+        numbers: Array,
+    ) -> None:
+        places = LiveInputs(engine.packed.system, read).places
+        self.memory = Memory(engine.ffi)
+        self.moving = [
+            k for k, row in enumerate(places)
+            if (row >= 0).any() and any(channel[k].varies for channel in channels)
+        ]  # fmt: skip
+        for k, row in enumerate(places):
+            there = row >= 0
+            if there.any() and k not in self.moving:
+                numbers[:, row[there]] = [np.array(one[k].at(0.0))[there] for one in channels]
+        self.places = np.ascontiguousarray(places[self.moving])
+        several = [channel[k] for channel in channels for k in self.moving]
+        self.records = write_inputs(several, [-1] * len(several), self.memory)
+
+    def fill(self, view: Any, ffi: Any) -> None:
+        """Tell the lanes of a thread."""
+        view.live.n, view.live.inputs = len(self.moving), self.records
+        view.live.places = ffi.from_buffer("int[]", self.places)
+
+
+@dataclass
+class Lanes:
+    """What all trajectories share, and a system per thread for what it settles."""
+
+    engine: LoopedEngine
+    library: FusedLibrary
+    settings: Settings
+    systems: list[SceneSystem]
+    numbers: Array  # (n, np)
+    width: int
+    inputs: LaneInputs
+
+
+def run_lanes(lanes: Lanes, start: Array) -> tuple[Array, Any]:
+    """Samples (n, times, width), nan where a trajectory did not come, and n `mstmm_outcome`."""
+    ffi, lib, settings = lanes.engine.ffi, lanes.engine.lib, lanes.settings
+    n, times = len(start), np.asarray(settings.output_times, dtype=np.float64)
+    samples, last = np.full((n, len(times), lanes.width), np.nan), np.zeros((n, lanes.width))
+    outcomes = ffi.new("mstmm_outcome[]", n)
+    many = ffi.new("mstmm_many *")
+    kept = _problem(lanes, many.problem, times)
+    many.n, many.outcomes = n, outcomes
+    arrays = [lanes.engine.pointer(array) for array in (start, samples, last)]
+    many.y0, many.samples, many.last = arrays
+    numbers = lanes.engine.pointer(lanes.numbers)
+    stop = threading.Event()
+    groups = [_group(lanes, many, system, numbers, kept) for system in lanes.systems]
+    for group in groups:
+        if lib.mstmm_group_start(group):
+            raise SceneError("simulate_batch: check t_end, above t_start, and the tolerances")
+
+    def work(group: Any) -> None:
+        while not stop.is_set():
+            if lib.mstmm_group_advance(group, SLICE) == Status.FINISHED:
+                return
+
+    on_threads(work, groups, len(groups), stop)
+    return samples, outcomes
+
+
+def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
+    """Fills the run that all trajectories copy; returns what it points to."""
+    engine, settings = lanes.engine, lanes.settings
+    atol = np.full(lanes.width, float(settings.atol))
+    known = engine.packed.time_map(settings.t_start, settings.t_end)
+    arrays = [np.array(x) for x in (atol, known.breaks, times, known.starts, known.longest)]
+    pointers = [engine.pointer(array) for array in arrays]
+    run.tableau = c_tableau(engine.ffi, get(settings.method))
+    run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
+    run.fixed_step = settings.step or 0.0
+    run.max_step, run.max_steps = settings.max_step, settings.max_steps
+    run.first_step = settings.first_step
+    run.atol, run.breaks, run.outputs, run.bound_starts, run.bounds = pointers
+    run.n_breaks, run.n_outputs, run.n_bounds = len(known.breaks), len(times), len(known.starts)
+    end = engine.pointer(np.array([known.pole[0]])) if known.pole else engine.ffi.NULL
+    run.pole = end
+    return [*arrays, *pointers, end]
+
+
+def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: list[Any]) -> Any:
+    """`mstmm_group *` of one thread, with workspace and system of its own."""
+    ffi, lib = lanes.engine.ffi, lanes.engine.lib
+    group, system = ffi.new("mstmm_group *"), ffi.new("mstmm_system *")
+    view = ffi.new("mstmm_scene_lanes *")
+    view.fused, view.p, view.settle = lanes.library.descriptor, numbers, settling.run
+    view.p_stride = lanes.numbers.shape[1]
+    scratch = np.zeros(max(1, lib.mstmm_lanes_numbers(view.fused)))
+    view.numbers = lanes.engine.pointer(scratch)
+    lib.mstmm_scene_lanes_system(view, system, group)
+    system.n_memory = 0  # where steps end near singular poses is remembered of single runs
+    group.many = many
+    workspace = np.zeros(max(1, lib.mstmm_group_size(system, many.problem.tableau)))
+    group.workspace = lanes.engine.pointer(workspace)
+    lanes.inputs.fill(view, ffi)
+    kept += [system, view, scratch, workspace, lanes.inputs]
+    return group

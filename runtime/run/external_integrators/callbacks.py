@@ -1,0 +1,107 @@
+"""The call-backs of a scene as integrators written elsewhere ask for them."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from ...engine.jacobian import OdeJacobian
+from ...integrate.c_loop import Status
+from ..scene_system import SceneSystem
+
+if TYPE_CHECKING:
+    from ...engine.compiled_scene import CompiledScene
+
+
+class RunEnded(Exception):
+    """The run is over before its end: why, and a sentence."""
+
+    def __init__(self, status: Status, message: str) -> None:
+        super().__init__(message)
+        self.status, self.message = status, message
+
+
+class Equations:
+    """The call-backs of a model, taken from the C structure and called from Python."""
+
+    def __init__(self, model: CompiledScene) -> None:
+        self.engine = model.looped
+        self.scene = SceneSystem(self.engine)
+        self.calls = self.scene.system
+        self.ffi = self.engine.ffi
+        self.bounds = (-np.inf, np.inf)
+        self.failure, self.evaluations = "", 0
+        memory = self.scene.memory
+        self._jacobian = cache(
+            lambda: OdeJacobian(model, self.scene.with_power, memory, self.rates)
+        )
+
+    def rates(self, t: float, y: Array) -> Array:
+        """dy/dt; nan where it cannot be evaluated, which makes SciPy try a smaller step."""
+        state, rates = np.ascontiguousarray(y, dtype=np.float64), np.empty(len(y))
+        code = self.calls.rhs(self.calls.context, self._inside(t), self._c(state), self._c(rates))
+        self.evaluations += 1
+        if code:
+            self.failure = self.engine.failure_text(self.scene.run.failure, t)
+            rates[:] = np.nan
+        return rates
+
+    def jacobian(self, t: float, y: Array) -> Array:
+        """d(dy/dt)/dy, (n, n)."""
+        return self._jacobian()(self._inside(t), np.ascontiguousarray(y, dtype=np.float64))
+
+    def _inside(self, t: float) -> float:
+        """A break is never seen itself."""
+        return min(max(t, self.bounds[0]), self.bounds[1])
+
+    def _c(self, array: Array) -> Any:
+        return self.ffi.from_buffer("double[]", array)
+
+    def events(self, t: float, y: Array) -> Array:
+        """Values of the events; negative where they are not true."""
+        return self.watched(t, y)[: self.calls.n_events]
+
+    def watched(self, t: float, y: Array) -> Array:
+        """Values of the events, and behind them the margins of switches."""
+        values = self.scene.watched(t, y)
+        if values is None:
+            text = self.engine.failure_text(self.scene.run.failure, t)
+            raise RunEnded(Status.EVENT_FAILED, text)
+        return values
+
+    def see(self, t: float, y: Array, rates: Array) -> Any:
+        """What the conditions read at the state that was `watched` last, for `enclose`."""
+        found = self.ffi.new("double[]", max(1, int(self.calls.n_seen)))
+        state, slopes = (np.ascontiguousarray(x, dtype=np.float64) for x in (y, rates))
+        self.calls.see(self.calls.context, t, self._c(state), self._c(slopes), found)
+        return found
+
+    def enclose(self, left: float, seen_left: Any, right: float, seen_right: Any) -> Array:
+        """(n, 4) of all that is watched between two times (s): low, high and those of the slope."""
+        found = np.empty((self.calls.n_events + self.calls.n_switches, 4))
+        bounds = self.ffi.cast("mstmm_bounds *", self._c(found))
+        self.calls.enclose(self.calls.context, right - left, seen_left, seen_right, bounds)
+        return found
+
+    def lets_through(self, event: int, t: float, y: Array, value: float) -> bool:
+        """Whether a state moves on into an event that throws back, whose value there is given."""
+        state = self._c(np.ascontiguousarray(y, dtype=np.float64))
+        return bool(self.calls.lets_through(self.calls.context, event, t, state, value))
+
+    def remember(self, t: float, y: Array) -> Array:
+        """After a step: memory of turns brought up to date; the settled state."""
+        state = np.array(y)
+        if self.calls.accept == self.ffi.NULL:
+            return state  # there is nothing to settle
+        if self.calls.accept(self.calls.context, t, self._c(state)) > 0:  # below 0: rates change
+            text = self.engine.failure_text(self.scene.run.failure, t)
+            raise RunEnded(Status.ACCEPT_FAILED, text)
+        return state
+
+    def fire(self, event: int, t: float, y: Array) -> int:
+        """What it answers; a bounce changes y in place."""
+        return int(self.calls.fire(self.calls.context, event, t, self._c(y)))
