@@ -169,7 +169,7 @@ class Result(Record, NotebookDisplay):
     ) -> Path:
         """Write a self-contained report; see `mstmm.write_report`, which this calls."""
         # by name: the equations come from derive, which this room does not know
-        report = import_module("mstmm").report
+        report = import_module("mstmm").write_report
         report_path: Path = report(self, path, title=title, quantities=quantities, trails=trails)
         return report_path
 
