@@ -30,7 +30,7 @@ settings.load_profile("mstmm")
 
 # The comparisons with other programs need those programs, which live in an environment of their
 # own (CONTRIBUTING.md, "Tests"); there `pytest tests/other_programs` runs them.
-collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["peers"]
+collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["other_programs"]
 
 
 @pytest.hookimpl(tryfirst=True)
