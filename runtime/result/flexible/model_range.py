@@ -20,6 +20,7 @@ from .modal_energy import modal_energy, modal_frequencies, strain_energy
 from .modal_participation import participation_by_body
 from .motion import elastic_moment, tilde
 from .section_loads import section_loads
+from .unshaped_directions import UnshapedDeformation, unshaped_deformation
 
 if TYPE_CHECKING:
     from .body_motions import FlexibleBodies
@@ -65,6 +66,7 @@ class ModelRange:
         one_way: it responds to a rigid run, linearly, and is no part of it.
         tail_of: what `tail` is a part of.
         unmoved_frame: the frame that deflections count from with fewer shapes, where it is another.
+        unshaped: deformation of a beam in a direction for which it has no shapes, if it matters.
     """
 
     name: str
@@ -86,6 +88,7 @@ class ModelRange:
     one_way: bool = False
     tail_of: str = e.BENDING_ENERGY
     unmoved_frame: str = ""
+    unshaped: UnshapedDeformation | None = None
 
     @property
     def frame_error(self) -> float:
@@ -148,8 +151,10 @@ def _model_range(
     slope, shapes = e.max_slope(finite_motion), body.shapes
     first_frequency = float(modal_frequencies(body)[0])
     has_section_loads = shapes is not None and name not in flexible.unbalanced
-    tail, lateral_load_ratio = (
-        _section_estimates(flexible, name, samples, line) if has_section_loads else (None, None)
+    tail, lateral_load_ratio, unshaped = (
+        _section_estimates(flexible, name, samples, line, slope)
+        if has_section_loads and len(samples)
+        else (None, None, None)
     )
     if body.truncation is not None and name not in flexible.unbalanced:
         tail = missed_deflection(flexible, name, samples)
@@ -173,6 +178,7 @@ def _model_range(
         name in flexible.one_way,
         e.BENDING_ENERGY if shapes else e.DEFLECTION,
         body.unmoved_frame,
+        unshaped,
     )
 
 
@@ -215,13 +221,15 @@ def _load_ratio_bounds(
 
 
 def _section_estimates(
-    flexible: FlexibleBodies, name: str, some: NDArray[np.int64], line: float | None
-) -> tuple[float | None, float | None]:
-    """What the true loads of a beam's sections tell: bending energy of the difference of their
-    moments and those of the shapes, over that of the former; and `lateral_load_ratio`."""
+    flexible: FlexibleBodies,
+    name: str,
+    some: NDArray[np.int64],
+    line: float | None,
+    slope: float,
+) -> tuple[float | None, float | None, UnshapedDeformation | None]:
+    """Estimates from the true section loads of a beam: missed part of the bending energy,
+    `lateral_load_ratio`, and deformation in directions without shapes."""
     motion = flexible.motion(name).some(some)
-    if not len(some):
-        return None, None
     inboard_x = flexible.held_place(name)
     x, weights = quadrature_rule(motion.shapes, inboard_x)
     points = [p.some(some) for p in flexible.point_loads(name)]
@@ -231,6 +239,7 @@ def _section_estimates(
     return (
         missed_bending_energy(motion, x, weights, moment[:, :, 1:]),
         lateral_load_ratio(motion.body, x, weights, inboard_x, length, force, moment),
+        unshaped_deformation(motion.body, x, weights, force, moment, slope),
     )
 
 

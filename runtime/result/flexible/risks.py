@@ -44,6 +44,7 @@ def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
         _rotation_risk,
         _strain_risk,
         _shape_risk,
+        _unshaped_risk,
         _buckling_risk,
         _lateral_buckling_risk,
         _shear_risk,
@@ -139,6 +140,17 @@ def _shape_risk(one: ModelRange) -> Risk | None:
         one.tail,
         MAX_MISSED_SHARE,
     )
+
+
+def _unshaped_risk(one: ModelRange) -> Risk | None:
+    if one.unshaped is None:
+        return None
+    return Risk(
+        "shapes", f'"{one.name}"',
+        f'the loads of "{one.name}" would {one.unshaped}, but it has no shapes there and stays '
+        "rigid", f"add {one.unshaped.direction} = 2 to its modes",
+        one.unshaped.size, one.unshaped.limit, one.unshaped.unit,
+    )  # fmt: skip
 
 
 def _buckling_risk(one: ModelRange) -> Risk | None:

@@ -186,3 +186,49 @@ def test_shapes_of_welded_beams_are_judged_on_the_line() -> None:
     assert on_line == pytest.approx(part / 16, rel=1e-9)
     moved = model.simulate(1e-3).certificate.flexible[0].shear
     assert moved is not None and moved <= on_line.max() * (1 + 1e-12)
+
+
+# --- directions without shapes --------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("load", "modes", "bend"),
+    [
+        ([0, 0, 10.0], {"y": 2}, 10.0 / (2 * 100.0)),  # P L^2 / 2 EI
+        ([0, 10.0, 0], {"z": 2}, 10.0 / (2 * 100.0)),
+        ([0, 10.0, 10.0], {"y": 2}, 10.0 / (2 * 100.0)),
+        ([0, 0, 10.0], {"y": 2, "z": 2}, None),
+        ([0, 10.0, 0], {"y": 2}, None),
+        ([0, 10.0, 0.1], {"y": 2}, None),  # 1 % of the other plane
+    ],
+)
+def test_a_load_across_a_plane_without_shapes_is_an_objection(
+    load: list[float], modes: dict[str, int], bend: float | None
+) -> None:
+    model = mstmm.compile(bar(load, modes=modes))
+    for answer in (model.equilibrium(), model.simulate(1e-3, output_times=[0.0])):
+        found = [risk for risk in answer.risks if "no shapes there" in risk.means]
+        assert [risk.name for risk in found] == ([] if bend is None else ["shapes"])
+        if bend is not None:
+            assert not answer.trusted
+            assert found[0].figure == pytest.approx(bend, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("load", "says"),
+    [
+        ({"force": [20.0, 0, 0]}, "stretch it by 0.002 of its length"),  # N / EA
+        ({"moment": [0.5, 0, 0]}, "twist it by 0.01 rad"),  # T L / GI_t
+    ],
+)
+def test_tension_and_torque_without_shapes_for_them_are_objections(
+    load: dict[str, list[float]], says: str
+) -> None:
+    one = {"name": "bar", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 100.0,
+           "torsional_stiffness": 50.0, "axial_stiffness": 1e4, "modes": {"y": 2}}  # fmt: skip
+    scene = mstmm.Scene(
+        gravity=(0, 0, 0), beam=[one], hinge=[WALL], load=[{"on": "bar.tip", **load}]
+    )
+    found = mstmm.compile(scene).equilibrium()
+    assert not found.trusted
+    assert any(says in text for text in found.warnings)

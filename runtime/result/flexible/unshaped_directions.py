@@ -1,0 +1,97 @@
+"""Deformation of beams in directions for which they have no shape functions.
+
+A beam is rigid where it has no shapes.  The loads of its sections tell how far it would deform
+there: bend by int |M| / EI dx, twist by int |T| / GI_t dx, and stretch by int |N| / EA dx.  These
+angles do not depend on the floating frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mstmm.array_validation import Array
+
+from ...flexible.beam.static_shapes import stiffness_of
+from ...flexible.modal_body import ModalBody
+
+#: Deformations that are too small to matter: rad, of axial a strain.
+_NEGLIGIBLE = {"y": 2e-3, "z": 2e-3, "twist": 2e-3, "axial": 1e-3}
+#: Share of the slope that the shapes take up, below which a deformation does not matter.
+_NEGLIGIBLE_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class UnshapedDeformation:
+    """Deformation (rad, of axial a strain) that loads would cause in a direction without shapes."""
+
+    direction: str
+    size: float
+
+    @property
+    def limit(self) -> float:
+        """Size from which on it matters."""
+        return _NEGLIGIBLE[self.direction]
+
+    @property
+    def unit(self) -> str:
+        """Unit of the size: 1 for a strain."""
+        return "1" if self.direction == "axial" else "rad"
+
+    def __str__(self) -> str:
+        if self.direction == "axial":
+            return f"stretch it by {self.size:.2g} of its length"
+        verb = "twist it" if self.direction == "twist" else f"bend it along {self.direction}"
+        return f"{verb} by {self.size:.2g} rad"
+
+
+def unshaped_deformation(
+    body: ModalBody, x: Array, weights: Array, force: Array, moment: Array, slope: float
+) -> UnshapedDeformation | None:
+    """Largest deformation that matters, over its limit; None where there is none.
+
+    `force` and `moment` (n, m, 3) in N and N*m are the section loads at the points x (m,) of a
+    quadrature rule with `weights` (m), and `slope` is the largest slope that the shapes have.
+    """
+    found = (
+        UnshapedDeformation(direction, float(np.max(np.abs(load) @ (weights / stiffness))))
+        for direction, stiffness, load in _unshaped_loads(body, x, force, moment)
+    )
+    significant = [
+        deformation
+        for deformation in found
+        if np.isfinite(deformation.size)
+        and deformation.size > deformation.limit
+        and deformation.size > _NEGLIGIBLE_SHARE * slope
+    ]
+    return max(significant, key=lambda one: one.size / one.limit, default=None)
+
+
+def unshaped_directions(body: ModalBody) -> list[str]:
+    """Directions of known stiffness for which a beam has no shapes: of y, z, twist, axial."""
+    if body.shapes is None:
+        return []
+    shaped = {mode.direction for mode in body.shapes.modes}
+    return [
+        direction
+        for direction in _NEGLIGIBLE
+        if direction not in shaped and stiffness_of(body.shapes.data, direction).min() > 0
+    ]
+
+
+def _unshaped_loads(
+    body: ModalBody, x: Array, force: Array, moment: Array
+) -> Iterator[tuple[str, Array, Array]]:
+    """Direction, stiffness (m,) and section load (n, m) of each of them."""
+    assert body.shapes is not None
+    sections, length = body.shapes.sections(x), body.shapes.length
+    loads = {
+        "y": (sections.EI_z, moment[..., 2]),
+        "z": (sections.EI_y, moment[..., 1]),
+        "twist": (sections.GI_t, moment[..., 0]),
+        "axial": (sections.EA * length, force[..., 0]),
+    }
+    for direction in unshaped_directions(body):
+        yield direction, *loads[direction]
