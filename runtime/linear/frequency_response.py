@@ -31,6 +31,7 @@ from .harmonic.harmonic_solve import Amplitudes
 from .harmonic.hysteretic_damping import Losses, stiffer
 from .harmonic.modal_damping import Ratios, modal_damping
 from .harmonic.steady_states import find_time_risks, refuse_turning, refuse_unsteady
+from .harmonic.unshaped_response import unshaped_response_risks
 from .harmonic_loads import HarmonicLoads
 from .input_channels import Channel, channel, some_names
 from .mck_matrices import Matrices
@@ -199,6 +200,13 @@ def frequency_response(
         yield from find_response_risks(linear, pushes, outputs is not None)
         yield from find_time_risks(linear, pushes, shown)
         yield from response_range_risks(linear.model, frequencies, exact_names)
+        if beams is None:
+            yield from unshaped_response_risks(linear, pushes, frequencies, respond)
+
+    def respond(of: LinearEquations, by: Sequence[Channel], at: Array) -> tuple[Complex, Array]:
+        read = outputs_of(of, [one.name for one in shown])
+        ratio = modal if isinstance(modal, (int, float)) else 0.0
+        return _Sweep(of, by, read, structural, ratio, None).values_and_rounding(at)
 
     return FrequencyResponse(
         frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
@@ -279,6 +287,11 @@ class _Sweep:
         batch = max(1, _BATCH // max(1, self.columns.size))
         parts = [self._batch(omega[k : k + batch]) for k in range(0, len(omega), batch)]
         return np.concatenate(parts)
+
+    def values_and_rounding(self, omega: Array) -> tuple[Complex, Array]:
+        """The same, and the size (outputs, inputs) of responses that are rounding."""
+        s = np.asarray(1j * omega, dtype=np.complex128)
+        return self.values(omega), _NOISE * self._reach(s, self._at(s)[-1])
 
     def _batch(self, omega: Array) -> Complex:
         values, growth, grown, _ = self._at(np.asarray(1j * omega, dtype=np.complex128))

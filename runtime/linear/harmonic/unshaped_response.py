@@ -1,0 +1,102 @@
+"""Effect on a frequency response of beam directions that have no shape functions.
+
+A beam is rigid in a direction without shapes, so that a response that excites it is wrong at any
+frequency.  The same response of the scene with shapes there tells by how much.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mstmm.array_validation import Array
+from mstmm.errors import MstmmError
+from mstmm.risk import Risk
+
+from ...packing.scene_parameters import data_of, made_of
+from ...result.flexible.unshaped_directions import unshaped_directions
+from ..input_channels import Channel
+
+if TYPE_CHECKING:
+    from ...engine.compiled_scene import CompiledScene
+    from ..linear_equations import LinearEquations
+
+#: Shapes that a direction gets, frequencies that are compared, and the relative change of a
+#: response that matters.
+_SHAPES, _FREQUENCIES, _CHANGE = 2, 7, 0.1
+
+#: Values (k, outputs, inputs) and their rounding (outputs, inputs) at frequencies (k,) in rad/s.
+Response = Callable[
+    ["LinearEquations", Sequence[Channel], Array], tuple[NDArray[np.complex128], Array]
+]
+
+
+def unshaped_response_risks(
+    linear: LinearEquations, inputs: Sequence[Channel], omega: Array, response: Response
+) -> Iterator[Risk]:
+    """Beams whose shapes lack a direction that changes the response at omega (k,) in rad/s."""
+    lacking = {
+        name: directions
+        for name, body in linear.model.flexible.items()
+        if (directions := [d for d in unshaped_directions(body) if d != "axial"])
+    }
+    if not lacking or linear.carrying is not None:
+        return
+    picked = np.unique(np.linspace(0, len(omega) - 1, _FREQUENCIES).astype(int))
+    try:
+        fuller = _with_shapes(linear, inputs, lacking)
+        given, _ = response(linear, inputs, omega[picked])
+        expected, rounding = response(fuller, fuller.controls, omega[picked])
+    except MstmmError:  # an undamped resonance, or a scene that is refused with these shapes
+        return
+    size = np.maximum(np.abs(given), np.abs(expected)).max(axis=0)
+    change = np.abs(given - expected).max(axis=0)
+    share = np.divide(change, size, out=np.zeros_like(size), where=change > rounding)
+    if (worst := float(share.max())) > _CHANGE:
+        name, directions = next(iter(lacking.items()))
+        others = f" (and {len(lacking) - 1} more beams)" if len(lacking) > 1 else ""
+        yield Risk(
+            "shapes", f'"{name}"',
+            f'"{name}"{others} has no shapes of {" and ".join(directions)}: with them the '
+            f"response changes by {worst:.0%}",
+            f"add {', '.join(f'{d} = {_SHAPES}' for d in directions)} to its modes",
+            worst, _CHANGE,
+        )  # fmt: skip
+
+
+def _with_shapes(
+    linear: LinearEquations, inputs: Sequence[Channel], lacking: Mapping[str, Sequence[str]]
+) -> LinearEquations:
+    """The linear model at the same state, its beams with shapes in these directions too."""
+    model, state = linear.model, linear.state
+    data = data_of(model.scene)
+    for beam in data["beam"]:
+        if beam["name"] in lacking:
+            body = model.flexible[beam["name"]]
+            for key in ("initial", "shapes"):
+                beam.pop(key, None)
+            counts = Counter(mode.rstrip("0123456789") for mode in body.modes)
+            beam["modes"] = {**counts, **dict.fromkeys(lacking[beam["name"]], _SHAPES)}
+            beam["frame"] = body.frame
+    made = type(model)(made_of(data, model.scene), model.known)
+    amplitudes = None if linear.dry is None else linear.dry.amplitudes
+    return made.linearize(
+        _by_mode(state.q, "q_slice", model, made), _by_mode(state.u, "u_slice", model, made),
+        state.t, inputs=[one.name for one in inputs], friction=amplitudes,
+    )  # fmt: skip
+
+
+def _by_mode(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
+    """Coordinates or speeds of a model in the order of one whose beams have more shapes."""
+    slices = [getattr(slots, part) for slots in model.layout.modal.values()]
+    hinges = min(one.start for one in slices)
+    pieces = [values[:hinges]]
+    for name in made.layout.modal:
+        own = values[getattr(model.layout.modal[name], part)]
+        modes = dict(zip(model.flexible[name].modes, own, strict=True))
+        pieces.append(np.array([modes.get(mode, 0.0) for mode in made.flexible[name].modes]))
+    return np.concatenate(pieces)
