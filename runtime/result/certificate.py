@@ -18,7 +18,7 @@ from .flexible import model_range
 from .flexible import risks as flexible_risks
 from .flexible.model_range import ModelRange
 from .loop_closure_error import Closure
-from .result_risks import balance_risks, finiteness_risks, quaternion_risks
+from .result_risks import balance_risks, finiteness_risks, misfit_risks, quaternion_risks
 from .step_control import StepControl
 from .verdict import DEFAULT_ACCURACY, Verdict
 
@@ -101,7 +101,8 @@ class Certificate(NotebookDisplay):
         checked = (pivot, singular, self.step if is_too_long_at_start else self.later)
         return order_risks((
             *finiteness_risks(self.finite, self.reached), *self.known,
-            *balance_risks((self.energy, *self.momentum), self.control),
+            *misfit_risks(self.closure, self.known),
+            *balance_risks((self.energy, *self.momentum), self.control, self.closure),
             *quaternion_risks(self.quaternion_residual),
             *(x.risk for x in checked if x is not None and x.risk is not None),
             *flexible_risks.flexibility_risks(self.flexible), *self.models,

@@ -10,8 +10,10 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
+from ..engine.loops.loop_analysis import NEGLIGIBLE_MISFIT
 from ..engine.loops.loop_calls import LoopCalls
 from ..integrate.steppers import INDEX3_SUFFIX
+from ..packing.loops.system_variants import LOCKED, length_of
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
@@ -19,13 +21,17 @@ if TYPE_CHECKING:
 
 #: Maximum numbers of checked samples and of named rows.
 _MAX_SAMPLES, _MAX_NAMED_ROWS = 12, 8
+#: Gaps of redundant rows over those of independent rows, from which on the geometry has them.
+_MISFIT_RATIO = 10.0
 
 
 @dataclass(frozen=True)
 class Closure:
     """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and in words
     how many rows count, those that repeat others, and the components of loads that rigid bodies
-    leave open.  Steps `on_positions` leave slips of the size of their errors."""
+    leave open.  Steps `on_positions` leave slips of the size of their errors.  `misfit` is the
+    largest gap (m, rad) of a redundant row if it is no rounding, else 0, and `misfit_loop` names
+    its loop."""
 
     gap: float
     slip: float
@@ -33,6 +39,8 @@ class Closure:
     repeated: str = ""
     open_loads: str = ""
     on_positions: bool = False
+    misfit: float = 0.0
+    misfit_loop: str = ""
 
     def __str__(self) -> str:
         text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
@@ -52,24 +60,31 @@ def loop_closure(model: CompiledScene, run: Trajectory) -> Closure | None:
     if model.closed is None or not len(run.t):
         return None
     calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
+    misfit, misfit_loop = NEGLIGIBLE_MISFIT * LOCKED * length_of(model.packed.system), ""
     for k in np.unique(np.linspace(0, len(run.t) - 1, _MAX_SAMPLES).astype(int)):
         q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
         if model.packed.releases:
             calls.memory = np.array(run.memory[k])
-        gap = max(gap, _max_residual(calls, calls.gap, q, u, t))
-        slip = max(slip, _max_residual(calls, calls.slip, q, u, t))
+        gaps = _residuals(calls, calls.gap, q, u, t)
+        redundant_gaps = np.where(calls.inverses() > 0, 0.0, gaps)
+        row = int(np.argmax(redundant_gaps))
+        if redundant_gaps[row] > max(misfit, _MISFIT_RATIO * np.max(gaps - redundant_gaps)):
+            misfit, misfit_loop = float(redundant_gaps[row]), calls.closing(row)
+        gap = max(gap, float(np.max(gaps)))
+        slip = max(slip, float(np.max(_residuals(calls, calls.slip, q, u, t))))
     on_positions = run.settings.method.endswith(INDEX3_SUFFIX)
     loops = model.closed.loops
     return Closure(
-        gap, slip, loops.counted, loops.repeated(_MAX_NAMED_ROWS), loops.open_loads, on_positions
-    )
+        gap, slip, loops.counted, loops.repeated(_MAX_NAMED_ROWS), loops.open_loads, on_positions,
+        misfit if misfit_loop else 0.0, misfit_loop,
+    )  # fmt: skip
 
 
-def _max_residual(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> float:
-    """Largest constraint residual at one state; nan where it cannot be evaluated."""
+def _residuals(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> Array:
+    """Constraint residuals (rows,) at one state; nan where it cannot be evaluated."""
     try:
-        residual = calls.correction(level, q, u, t=t)[1]
-        residual[calls.let_go()] = 0.0
-        return float(np.abs(residual).max(initial=0.0))
+        residuals = np.abs(calls.correction(level, q, u, t=t)[1])
     except NumericalFailure:
-        return np.nan
+        return np.full(calls.count, np.nan)
+    residuals[calls.let_go()] = 0.0
+    return residuals

@@ -10,8 +10,10 @@ from mstmm.array_validation import Array
 from mstmm.risk import RUN, Risk
 
 from ..integrate.achieved_error import AchievedError
+from ..risk_checks.loop_misfit import MISFIT_REMEDY, MISFIT_RISK
 from ..run.trajectory import Trajectory
 from .certificate_data import Drift
+from .loop_closure_error import Closure
 from .step_control import StepControl
 
 #: Distance of a quaternion's length from 1 that is a risk.
@@ -48,8 +50,11 @@ def output_risks(run: Trajectory, outputs: Mapping[str, Array]) -> Iterator[Risk
             )
 
 
-def balance_risks(drifts: Sequence[Drift], control: StepControl) -> Iterator[Risk]:
+def balance_risks(
+    drifts: Sequence[Drift], control: StepControl, closure: Closure | None = None
+) -> Iterator[Risk]:
     """Findings: energy and momentum that are unknown, or drift more than steps explain."""
+    has_misfit = closure is not None and closure.misfit > 0
     for drift in drifts:
         if not drift.known:
             yield Risk(
@@ -63,10 +68,23 @@ def balance_risks(drifts: Sequence[Drift], control: StepControl) -> Iterator[Ris
                 _drift_risk_name(drift),
                 drift.name,
                 f"{drift.name} is not kept: it changes by {drift}",
-                control.finer(drift.relative),
+                MISFIT_REMEDY if has_misfit else control.finer(drift.relative),
                 drift.relative,
                 control.bound,
             )
+
+
+def misfit_risks(closure: Closure | None, known: Sequence[Risk]) -> Iterator[Risk]:
+    """Finding: a redundant row of a loop that is violated along the run, unless it is `known`."""
+    is_known = any(risk.name == MISFIT_RISK for risk in known)
+    if closure is None or is_known or not closure.misfit > 0:
+        return
+    yield Risk(
+        MISFIT_RISK, closure.misfit_loop,
+        f"a redundant row of {closure.misfit_loop} is violated by up to {closure.misfit:.1e} "
+        "(m, rad) along the motion: the geometry of the loop does not fit exactly",
+        MISFIT_REMEDY, closure.misfit,
+    )  # fmt: skip
 
 
 def quaternion_risks(residual: float) -> Iterator[Risk]:

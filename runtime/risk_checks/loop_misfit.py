@@ -12,6 +12,13 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..integrate.settings import Settings
 
+#: Name of the finding, and what helps.
+MISFIT_RISK = "nearly-redundant"
+MISFIT_REMEDY = (
+    "make the axes and lengths of the loop agree, with more digits, or model its compliance by a "
+    "bushing or a flexible body"
+)
+
 
 def concerns(model: CompiledScene) -> bool:
     """Whether rows that are left out leave more than rounding."""
@@ -25,9 +32,8 @@ def loop_misfit_risks(
     assert model.closed is not None
     gap, name, direction = model.closed.loops.misfit
     yield Risk(
-        "nearly-redundant", f'"{name}"',
-        f"its direction {direction} repeats what others do but for a gap of {gap:.1e} (m, rad); it "
-        "is left out, for met exactly it would lock the mechanism",
-        "make the axes and lengths of the loop agree, or say what bends in it, by a bushing or a "
-        "flexible body", before=True,
+        MISFIT_RISK, f'"{name}"',
+        f"direction {direction} of the loop is redundant, violated by {gap:.1e} (m, rad); it is "
+        "left out, for the mechanism would lock if it were satisfied exactly",
+        MISFIT_REMEDY, before=True,
     )  # fmt: skip

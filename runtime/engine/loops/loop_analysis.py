@@ -40,7 +40,7 @@ _CONSTRAINT_ROWS = {
 #: of the scene.
 _MAX_MISFIT = 1e-2
 #: Misfits of redundant rows that are rounding, relative to those that lock.
-_NEGLIGIBLE_MISFIT = 1e-3
+NEGLIGIBLE_MISFIT = 1e-3
 #: A pose is near a singular one if the strain is this many times that of the start.
 _SINGULAR_STRAIN_RATIO = 10.0
 #: Longest step (rad, m) along a branch.
@@ -394,7 +394,7 @@ class LoopStart:
         coupling_rows = [coupling.row for coupling in calls.records.couplings]
         gaps[coupling_rows] = np.maximum(gaps, velocity_errors)[coupling_rows]
         worst_row = max(repeating, key=lambda row: float(gaps[row]), default=None)
-        if worst_row is not None and gaps[worst_row] > much * _NEGLIGIBLE_MISFIT:
+        if worst_row is not None and gaps[worst_row] > much * NEGLIGIBLE_MISFIT:
             self.loops = replace(self.loops, misfit=(float(gaps[worst_row]), *repeating[worst_row]))
         for row, (closing, direction) in repeating.items():
             if gaps[row] > much:
