@@ -66,3 +66,18 @@ def scene_length(model: HasScales) -> float:
     radius = float(max(radii, default=0.0))
     min_length = _MIN_LENGTH_RATIO * radius if radius else _MIN_LENGTH_M
     return length if length > min_length else 1.0
+
+
+def total_mass(model: HasScales) -> float:
+    """Mass of all moving bodies, kg."""
+    scene = model.scene
+    mass = sum(body.mass for body in scene.body)
+    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
+    for body in model.flexible.values():
+        mass += sum(point.mass for point in body.points) if body.points else float(body.mass)
+    return mass
+
+
+def total_weight(model: HasScales) -> float:
+    """Weight of all moving bodies, N."""
+    return total_mass(model) * float(np.linalg.norm(model.scene.gravity))

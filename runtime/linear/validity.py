@@ -138,10 +138,11 @@ def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
             "the motion through it, and only for a moment"
         )
     else:
-        means = f"the state of t = {t:g} s does not last: {cause}, {leaving} moves {names}"
+        change = "changes slightly" if leaving.is_small else "does not last"
+        means = f"the state of t = {t:g} s {change}: {cause}, {leaving} moves {names}"
     return Risk(
         "unsteady-state", names, means, "take an equilibrium or a steady motion, or simulate",
-        abs(leaving.effort), None, leaving.unit,
+        abs(leaving.effort), None, leaving.unit, doubt=not leaving.is_small,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
-from ..engine.characteristic_scales import scene_length, speed_scales
+from ..engine.characteristic_scales import scene_length, speed_scales, total_mass
 from ..engine.looped_engine import LoopedEngine
 from ..engine.loops.independent_speeds import IndependentSpeeds
 from ..engine.loops.loop_calls import LoopCalls
@@ -61,7 +61,7 @@ class _Sweeps:
         self._scene = SceneSystem(engine, with_power=False)  # lays out tapes that need room
         self.stiffness = ShiftedStiffness(TangentMatrix(engine), t, speed_scales(model))
         gravity = float(np.linalg.norm(model.scene.gravity))
-        self._load = _mass(model) * gravity * scene_length(model)
+        self._load = total_mass(model) * gravity * scene_length(model)
 
     def find(
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
@@ -274,16 +274,10 @@ def _counted(progress: Progress | None) -> Progress | None:
     return None if progress is None else lambda _, length: progress(next(steps), length)
 
 
-def _mass(model: CompiledScene) -> float:
-    """Of all bodies that have one of their own, kg."""
-    bodies = model.scene.bodies.by_name.values()
-    return float(sum(body.mass for body in bodies if hasattr(body, "mass")))
-
-
 def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
     """The engine of the model with rotors on all hinges, as heavy as so many scenes."""
     packed = model.packed
-    rotors = weight * (_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
+    rotors = weight * (total_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
     engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
     if model.closed is not None:
         LoopCalls(engine, model.closed.start[0])  # judges its rows

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.scene import Hinge, Scene
 
+from ..engine.characteristic_scales import total_mass, total_weight
 from .certificate_data import Drift
-from .flexible.momentum import undeformed_inertia
 from .impacts import momentum_kept_by_impacts
 from .result_record import Record
 
@@ -61,20 +61,10 @@ def energy_drift(result: Record) -> Drift:
         exchanged = parts["kinetic"] + np.abs(work)
         for name in ("gravity", "springs"):
             exchanged = exchanged + np.abs(parts[name] - parts[name][:1])
-    rounding = (
-        _HEIGHT_ROUNDING * _total_mass(result) * float(np.linalg.norm(result.model.scene.gravity))
-    )
+    rounding = _HEIGHT_ROUNDING * total_weight(result.model)
     scale = max(_max_abs(exchanged), _STORED_ENERGY_RATIO * _max_stored_energy(parts), rounding)
     change = np.nan if overflows else _max_change(residual)
     return Drift("energy", "J", change if len(residual) else 0.0, scale, "exchanged")
-
-
-def _total_mass(result: Record) -> float:
-    """Total moving mass, kg."""
-    scene = result.model.scene
-    mass = sum(body.mass for body in scene.body)
-    mass += sum(chain.body_of(k).mass for chain in scene.chain for k in range(chain.count))
-    return mass + sum(undeformed_inertia(body)[0] for body in result.model.flexible.values())
 
 
 def _max_stored_energy(parts: Mapping[str, Array]) -> float:
@@ -107,7 +97,7 @@ def momentum_drifts(result: Record) -> list[Drift]:
     pivot, pivot_label = _momentum_pivot(result, reach)
     reach = max((_max_abs(result.position(name) - pivot) for name in names), default=0.0)
     kinetic = _max_abs(result.energies()["kinetic"])
-    mass = _total_mass(result)
+    mass = total_mass(result.model)
     linear, angular = result.momentum(), result.angular_momentum()
     angular = angular - np.cross(pivot, linear)
     is_conserved = np.array(_unsupported_axes(result, reach, kinetic, pivot)) & _gravity_free_axes(

@@ -52,12 +52,12 @@ def test_a_tree_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
     assert np.abs(found - 0.3).max() < 1e-12 and found.residuals == {}
 
 
-def carried(offset: float, inertia: list[float]) -> mstmm.Model:
+def carried(offset: float, inertia: list[float], drive: str = "20*t") -> mstmm.Model:
     """A disc of 2 kg that a drive turns on a sprung slide of 1 kg, its mass centre so far out."""
     disc = {"name": "disc", "mass": 2.0, "center_of_mass": [offset, 0, 0], "inertia": inertia}
     slide = {"name": "x", "type": "prismatic", "inboard": "ground", "outboard": "slide",
              "axis": [0, 1, 0], "law": {"stiffness": [1000.0]}}  # fmt: skip
-    pin = {"name": "p", "type": "pin", "inboard": "slide", "outboard": "disc", "drive": "20*t"}
+    pin = {"name": "p", "type": "pin", "inboard": "slide", "outboard": "disc", "drive": drive}
     scene = {"gravity": [0, -GRAVITY, 0], "body": [{"name": "slide", "mass": 1.0}, disc],
              "hinge": [slide, pin]}  # fmt: skip
     return mstmm.compile(mstmm.Scene(**scene), engine="looped")
@@ -73,6 +73,21 @@ def test_an_offset_of_rounding_is_no_length_and_no_unbalance(inertia: list[float
 
 @pytest.mark.parametrize("inertia", [0.0, 1e-3, 1.0])
 def test_an_unbalance_that_shakes_does_not_last(inertia: float) -> None:
-    for offset in (2e-6, 5e-6, 1e-5, 1e-4, 1e-3, 1e-2):
+    for offset in (1e-4, 1e-3, 1e-2):
         with pytest.raises(NumericalFailure, match="does not last: while drives move on"):
             carried(offset, 3 * [inertia]).equilibrium()
+
+
+@pytest.mark.parametrize("offset", [2e-6, 5e-6])
+def test_an_unbalance_far_below_the_weight_changes_the_rest_slightly(offset: float) -> None:
+    """m r omega^2 of 5e-5 and 1e-4 of the weight, far from resonance."""
+    found = carried(offset, 3 * [1.0]).equilibrium()
+    assert abs(found[0] + 3 * GRAVITY / 1000) < 1e-6
+    assert [risk.name for risk in found.risks] == ["unsteady-state"]
+    assert "changes slightly" in found.warnings[0]
+    assert found.trusted
+
+
+def test_a_small_unbalance_at_resonance_is_no_small_change() -> None:
+    with pytest.raises(NumericalFailure, match="does not last"):
+        carried(5e-6, 3 * [1.0], drive=f"{np.sqrt(1000 / 3):.15g}*t").equilibrium()

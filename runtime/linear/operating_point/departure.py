@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...engine.characteristic_scales import speed_scales
+from ...engine.characteristic_scales import scene_length, speed_scales, total_weight
 from .later import LaterStates
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 #: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
 #: stiffness that counts as none, in parts.
 _STILL, _SOFT = 1e-6, 1e-13
+#: Small change of a state: effort in parts of the scene's weight, distance in sizes of coordinates.
+_SMALL_EFFORT, _SMALL_DISTANCE = 1e-3, 1e-2
 #: Coordinates up to which matrices are made.
 LARGEST = 2000
 
@@ -27,13 +29,15 @@ LARGEST = 2000
 @dataclass(frozen=True)
 class Departure:
     """What leaves an operating point: names of `coordinates`, of which the effort (N or N*m) that
-    is missing along `worst` at time `t` (s) is the largest."""
+    is missing along `worst` at time `t` (s) is the largest.  It `is_small` if springs or gravity
+    hold all of them near the state against a load far below the weight."""
 
     coordinates: list[str]
     worst: str
     effort: float
     unit: str
     t: float
+    is_small: bool = False
 
     def __str__(self) -> str:
         return f"{abs(self.effort):.4g} {self.unit} along {self.worst} at t = {self.t:.6g} s"
@@ -48,7 +52,7 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     if not a.any():
         return None
     sizes = speed_scales(linear.model)[free]
-    leaves, efforts = _leaving(linear, a, sizes)
+    leaves, efforts, distances = _leaving(linear, a, sizes)
     if not leaves.any():
         return None
     if leaves[:, 0].any():  # what is wrong at once comes first
@@ -58,22 +62,51 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     names = [linear.coordinates[k] for k in np.flatnonzero(leaves.any(axis=1))]
     unit = "N*m" if linear.units[worst] == "rad" else "N"
     effort = float(efforts[worst, at])
-    return Departure(names, linear.coordinates[worst], effort, unit, states[at].t)
+    largest_load = total_weight(linear.model) * scene_length(linear.model)
+    is_small = (
+        later is not None
+        and np.max(distances[leaves]) <= _SMALL_DISTANCE
+        and work.max() <= _SMALL_EFFORT * largest_load
+        and _forced_distance(linear, later, efforts, sizes) <= _SMALL_DISTANCE
+    )
+    return Departure(names, linear.coordinates[worst], effort, unit, states[at].t, bool(is_small))
 
 
-def _leaving(linear: LinearEquations, a: Array, sizes: Array) -> tuple[NDArray[np.bool_], Array]:
-    """(n, k) which coordinates leave under accelerations a (n, k): those further from rest than a
-    small part of their sizes, and those that accelerate though nothing holds them; and the efforts
-    that are missing."""
+def _leaving(
+    linear: LinearEquations, a: Array, sizes: Array
+) -> tuple[NDArray[np.bool_], Array, Array]:
+    """(n, k) which coordinates leave under accelerations a (n, k), the missing efforts, and the
+    distances from rest in sizes.
+
+    Coordinates leave whose rest is farther away than a small part of their sizes, and those that
+    accelerate without anything that holds them, for which the distance is infinite.
+    """
     if len(linear) > LARGEST:
         columns = [_displacement_by_sweep(linear, column) for column in a.T]
-        return np.abs(np.array(columns).T / sizes[:, None]) > _STILL, _efforts(linear, a)
+        distances = np.abs(np.array(columns).T / sizes[:, None])
+        return distances > _STILL, _efforts(linear, a), distances
     stiffness, efforts = linear.K * np.outer(sizes, sizes), linear.M @ a
     pushed = efforts * sizes[:, None]
     away = np.asarray(np.linalg.lstsq(stiffness, pushed, rcond=_SOFT)[0], dtype=np.float64)
     missing = (pushed - stiffness @ away) / sizes[:, None]
-    left = np.asarray(np.linalg.solve(linear.M, missing) / sizes[:, None], dtype=np.float64)
-    return (np.abs(away) > _STILL) | (np.abs(left) > _STILL), efforts
+    free_acceleration = np.linalg.solve(linear.M, missing) / sizes[:, None]
+    distances = np.where(np.abs(free_acceleration) > _STILL, np.inf, np.abs(away))
+    return distances > _STILL, efforts, distances
+
+
+def _forced_distance(
+    linear: LinearEquations, later: LaterStates, efforts: Array, sizes: Array
+) -> float:
+    """Largest amplitude, in sizes, under these efforts (n, k) at the rate of the fastest drive;
+    infinite where no drive moves, and for matrices that are too large."""
+    if not later.driven or len(linear) > LARGEST:
+        return np.inf
+    rate = np.abs(linear.state.u[later.driven]).max()
+    try:
+        amplitudes = np.linalg.solve(linear.K - rate**2 * linear.M, efforts) / sizes[:, None]
+    except np.linalg.LinAlgError:  # resonance
+        return np.inf
+    return float(np.abs(amplitudes).max(initial=0.0))
 
 
 def _efforts(linear: LinearEquations, a: Array) -> Array:
