@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import hypot, sqrt
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from .welded_beams import beam_lines as lines_of
 
 if TYPE_CHECKING:
     from ..tables.beam import Beam
+    from ..tables.beam_keys import Section
     from ..tables.hinge import Hinge
     from ..tables.scene_tables import SceneTables
 
@@ -188,52 +189,63 @@ def short_beam_warnings(scene: SceneTables) -> Iterator[Risk]:
     """Warnings about beams that are short for their height; welded lines count as one beam."""
     if not scene.beam:
         return
-    lines_by_beam, reported_lines = lines_of(scene), set[str]()
+    lines = lines_of(scene)
+    beams_by_line: dict[str, list[Beam]] = {}
     for beam in scene.beam:
-        height, direction, source = max(_section_heights(beam), default=(0.0, "", ""))
-        line = lines_by_beam[beam.name]
-        if (
-            not 0 < line.length < MIN_SLENDERNESS * height
-            or line.first in reported_lines
-            or beam.model == "rigid"
-        ):
+        if beam.model != "rigid":
+            beams_by_line.setdefault(lines[beam.name].first, []).append(beam)
+    for beams in beams_by_line.values():
+        name, length = beams[0].name, lines[beams[0].name].length
+        heights = (_line_height(beams, k, direction) for k, direction in enumerate("zy"))
+        height, direction, source = max(heights)
+        if not 0 < length < MIN_SLENDERNESS * height:
             continue
-        reported_lines.add(line.first)
         length_text = (
-            "its length is" if line.length == beam.length else "its line of welded beams is"
+            "its length is" if length == beams[0].length else "its line of welded beams is"
         )
         yield Risk(
-            "short-beam",
-            f'beam "{beam.name}"',
-            f'beam "{beam.name}": {length_text} {line.length / height:.2g} times the height of the '
+            "short-beam", f'beam "{name}"',
+            f'beam "{name}": {length_text} {length / height:.2g} times the height of the '
             f"section along {direction} ({height:.3g} m from {source}), less than "
-            f"{MIN_SLENDERNESS:g}: "
-            "shear deformation, which Euler-Bernoulli beams neglect, is not small",
-            "use an elastic body from a mesh",
-            line.length / height,
-            MIN_SLENDERNESS,
+            f"{MIN_SLENDERNESS:g}: shear deformation, which Euler-Bernoulli beams neglect, is not "
+            "small", "use an elastic body from a mesh", length / height, MIN_SLENDERNESS,
             before=True,
-        )
+        )  # fmt: skip
 
 
-def _section_heights(beam: Beam) -> Iterator[tuple[float, str, str]]:
-    """Heights of the sections as if rectangular: (height in m, direction, source keys).
+def _line_height(beams: Sequence[Beam], k: int, direction: str) -> tuple[float, str, str]:
+    """Height (m) of the sections of beams in line, as if rectangular, with direction and source.
+
+    It is the root of the mean of its square, each section weighted by how far it bends under the
+    same moment: a short thick piece bends and shears little.
+    """
+    total, square, sources = 0.0, 0.0, list[str]()
+    for beam in beams:
+        if not _has_bending_shapes(beam, direction):
+            continue
+        for section in beam.sections:
+            section_square, source = _square_height(section, k)
+            if source and section.bending_stiffness is not None:
+                compliance = (section.to - section.from_) / section.bending_stiffness[k]
+                total, square = total + compliance, square + compliance * section_square
+                sources.append(source)
+    return (sqrt(square / total), direction, sources[0]) if sources else (0.0, direction, "")
+
+
+def _square_height(section: Section, k: int) -> tuple[float, str]:
+    """Square (m^2) of the height as if rectangular, and source keys; (0, "") if not known.
 
     The height is sqrt(12) times the radius of gyration, from rotary inertia or else from E I / E A.
     """
-    for section in beam.sections:
-        rotary_inertia, bending_stiffness = section.rotary_inertia, section.bending_stiffness
-        for k, direction in enumerate(("z", "y")):
-            if not _has_bending_shapes(beam, direction):
-                continue
-            if rotary_inertia is not None and section.mass_per_length:
-                source = "rotary_inertia and mass_per_length"
-                yield sqrt(12 * rotary_inertia[k] / section.mass_per_length), direction, source
-            elif (
-                rotary_inertia is None and bending_stiffness is not None and section.axial_stiffness
-            ):
-                source = "bending_stiffness and axial_stiffness"
-                yield sqrt(12 * bending_stiffness[k] / section.axial_stiffness), direction, source
+    rotary_inertia, bending_stiffness = section.rotary_inertia, section.bending_stiffness
+    if rotary_inertia is not None and section.mass_per_length:
+        return 12 * rotary_inertia[
+            k
+        ] / section.mass_per_length, "rotary_inertia and mass_per_length"
+    if rotary_inertia is None and bending_stiffness is not None and section.axial_stiffness:
+        source = "bending_stiffness and axial_stiffness"
+        return 12 * bending_stiffness[k] / section.axial_stiffness, source
+    return 0.0, ""
 
 
 def _has_bending_shapes(beam: Beam, direction: str) -> bool:
