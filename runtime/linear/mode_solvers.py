@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,8 +30,8 @@ def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Mo
     few = few and linear.mechanism is None and linear.carrying is None
     if count is None or not few or linear.turning is not None:
         found = _dense(linear, damped)
-        return found if count is None else found.first(count)
-    return _few(linear, count, damped)
+        return found if count is None else replace(found.first(count), count=count)
+    return replace(_few(linear, count, damped), count=count)
 
 
 def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:

@@ -45,12 +45,14 @@ class Modes(AssessedAnswer):
         shapes: (n, k), real with unit modal mass where there is neither damping nor gyroscopic
             load, else complex with the largest entry 1.
         complete: whether no mode below the last one is missing; None where that is not counted.
+        count: number of modes that was asked for; None if all were.
     """
 
     linear: LinearEquations = field(repr=False)
     eigenvalues: Complex
     shapes: NDArray[Any] = field(repr=False)
     complete: bool | None
+    count: int | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         if not len(self):
@@ -70,13 +72,22 @@ class Modes(AssessedAnswer):
         yield from self._range_risks()
 
     def _range_risks(self) -> Iterator[Risk]:
-        """Motions faster than those that the shapes of flexible bodies hold."""
-        model = self.linear.model
-        slowest = min(shape_limits(model).values(), default=np.inf)
-        fast = np.flatnonzero(self.omega > slowest)
+        """Modes above the frequency up to which the shapes of flexible bodies hold.
+
+        They are an objection if they were asked for by a count, or if no vibration is below it;
+        of all modes the highest are never accurate.
+        """
+        limit = min(shape_limits(self.linear.model).values(), default=np.inf)
+        fast = np.flatnonzero(self.omega > limit)
         if len(fast):
-            some = replace(self, eigenvalues=self.eigenvalues[fast], shapes=self.shapes[:, fast])
-            yield from motion_range_risks(model, some.omega, some.strain())
+            first = np.flatnonzero(self.omega > 0)[:1]
+            is_objection = self.count is not None or any(self._range_risks_of(first))
+            for risk in self._range_risks_of(fast):
+                yield replace(risk, doubt=is_objection)
+
+    def _range_risks_of(self, places: NDArray[np.intp]) -> Iterator[Risk]:
+        some = replace(self, eigenvalues=self.eigenvalues[places], shapes=self.shapes[:, places])
+        return motion_range_risks(self.linear.model, some.omega, some.strain())
 
     def motion_risks(self) -> Iterator[Risk]:
         """Motions that grow, and motions that nothing pushes back."""

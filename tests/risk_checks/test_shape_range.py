@@ -86,11 +86,26 @@ def test_exact_beams_have_no_limit() -> None:
 def test_motions_that_shapes_have_too_high_are_doubted() -> None:
     """The fourth of four static and fixed-interface shapes is 9 % too high."""
     model = compiled(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
-    every = model.linearize().modes()
-    assert every.omega[3] > 1.05 * 10.9955**2
-    (risk,) = (risk for risk in every.risks if risk.name == "frequency-range")
+    requested = model.linearize().modes(4)
+    assert requested.omega[3] > 1.05 * 10.9955**2
+    (risk,) = (risk for risk in requested.risks if risk.name == "frequency-range")
     assert risk.doubt and "a motion from" in risk.means
     assert model.linearize().modes(3).trusted
+
+
+def test_of_all_modes_the_highest_are_noted_and_no_objection() -> None:
+    model = compiled(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
+    every = model.linearize().modes()
+    assert [(risk.name, risk.doubt) for risk in every.risks] == [("frequency-range", False)]
+    assert every.trusted
+
+
+def test_all_modes_are_doubted_where_the_first_is_beyond_the_shapes() -> None:
+    """Half a sine wave is no shape of a cantilever."""
+    model = compiled(beam={"basis": "simply-supported", "modes": {"y": 1}})
+    every = model.linearize().modes()
+    assert every.omega[0] > 1.05 * CF[0] ** 2
+    assert not every.trusted
 
 
 def test_the_limit_of_an_elastic_body() -> None:
