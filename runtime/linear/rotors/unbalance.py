@@ -21,6 +21,7 @@ from .. import file_formats
 from .displacements import angular_velocity
 
 if TYPE_CHECKING:
+    from ..frequency_response import FrequencyResponse
     from ..linear_model import Linear
 
 Complex = NDArray[np.complex128]
@@ -124,16 +125,23 @@ def unbalance_response(
     axes = [angular_velocity(linear, at) for linear in models]
     spins = np.array([np.linalg.norm(axis) for axis in axes])
     across = _across(axes[int(spins.argmax())])
-    found = [
-        _whirl(linear, spin, size * across, places)
-        for linear, spin in zip(models, spins.tolist(), strict=True)
+    responses = [
+        _response(linear, spin, places) for linear, spin in zip(models, spins.tolist(), strict=True)
     ]
-    each = list(zip(values.tolist(), models, strict=True))
+    whirls = [
+        _whirl(response, spin, size * across, len(points))
+        for response, spin in zip(responses, spins.tolist(), strict=True)
+    ]
+    assessed = [
+        (value, response)
+        for value, response in zip(values.tolist(), responses, strict=True)
+        if response is not None
+    ]
     findings = DeferredRisks(
-        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in each])
+        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in assessed])
     )
     return UnbalanceResponse(
-        parameter, values, spins, places[0], size, tuple(places[1:]), np.array(found), across,
+        parameter, values, spins, places[0], size, tuple(places[1:]), np.array(whirls), across,
         findings,
     )  # fmt: skip
 
@@ -157,13 +165,20 @@ def _across(axis: Array) -> Array:
     return np.array([first, np.cross(along, first)])
 
 
-def _whirl(linear: Linear, spin: float, unbalance: Array, places: Sequence[str]) -> Complex:
-    """(points, 3) displacements under m e spin^2 that turns from the first direction on."""
-    at, points = places[0], places[1:]
+def _response(linear: Linear, spin: float, places: Sequence[str]) -> FrequencyResponse | None:
+    """Response of the points to forces at the first place, at the spin; None where it is 0."""
     if not spin:
-        return np.zeros((len(points), 3), dtype=np.complex128)
-    pushes = [f"{at}.force.{axis}" for axis in "xyz"]
-    shown = [f"{point}.position.{axis}" for point in points for axis in "xyz"]
-    response = linear.frequency_response([spin], pushes, shown)
+        return None
+    inputs = [f"{places[0]}.force.{axis}" for axis in "xyz"]
+    outputs = [f"{point}.position.{axis}" for point in places[1:] for axis in "xyz"]
+    return linear.frequency_response([spin], inputs, outputs)
+
+
+def _whirl(
+    response: FrequencyResponse | None, spin: float, unbalance: Array, count: int
+) -> Complex:
+    """(points, 3) displacements under m e spin^2 that turns from the first direction on."""
+    if response is None:
+        return np.zeros((count, 3), dtype=np.complex128)
     force = spin**2 * (unbalance[0] - 1j * unbalance[1])
-    return np.asarray((response.values[0] @ force).reshape(len(points), 3))
+    return np.asarray((response.values[0] @ force).reshape(count, 3))
