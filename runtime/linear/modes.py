@@ -52,7 +52,7 @@ class Modes(AssessedAnswer):
     eigenvalues: Complex
     shapes: NDArray[Any] = field(repr=False)
     complete: bool | None
-    count: int | None = field(default=None, repr=False)
+    count: int | None = field(default=None, repr=False, kw_only=True)
 
     def __repr__(self) -> str:
         if not len(self):

@@ -35,5 +35,5 @@ def loop_misfit_risks(
         MISFIT_RISK, f'"{name}"',
         f"direction {direction} of the loop is redundant, violated by {gap:.1e} (m, rad); it is "
         "left out, for the mechanism would lock if it were satisfied exactly",
-        MISFIT_REMEDY, before=True,
+        MISFIT_REMEDY, gap, before=True,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from ..input_channels import Channel
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
     from ..linear_equations import LinearEquations
+    from ..operating_point.friction import Amplitudes
 
 #: Shapes that a direction gets, frequencies that are compared, and the relative change of a
 #: response that matters.
@@ -33,6 +34,15 @@ _SHAPES, _FREQUENCIES, _CHANGE = 2, 7, 0.1
 Response = Callable[
     ["LinearEquations", Sequence[Channel], Array], tuple[NDArray[np.complex128], Array]
 ]
+
+
+@runtime_checkable
+class Linearisable(Protocol):
+    """Model with linear models about its states."""
+
+    def linearize(
+        self, q: Array, u: Array, t: float, *, inputs: Sequence[str], friction: Amplitudes
+    ) -> LinearEquations: ...
 
 
 def unshaped_response_risks(
@@ -83,6 +93,7 @@ def _with_shapes(
             beam["modes"] = {**counts, **dict.fromkeys(lacking[beam["name"]], _SHAPES)}
             beam["frame"] = body.frame
     made = type(model)(made_of(data, model.scene), model.known)
+    assert isinstance(made, Linearisable)
     amplitudes = None if linear.dry is None else linear.dry.amplitudes
     return made.linearize(
         _by_mode(state.q, "q_slice", model, made), _by_mode(state.u, "u_slice", model, made),

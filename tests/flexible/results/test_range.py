@@ -134,13 +134,16 @@ def test_positions_that_are_no_numbers_are_no_success() -> None:
 
 
 def welded(
-    parts: int, length: float, angle: float = 0.0, kind: str = "fixed", **last: str
-) -> mstmm.Scene:
-    """Parts of equal length end to end, 0.1 m high by EI/EA."""
+    parts: int, length: float, angle: float = 0.0, kind: str = "fixed", collar: int | None = None,
+    **last: str,
+) -> mstmm.Scene:  # fmt: skip
+    """Parts of equal length end to end, 0.1 m high by EI/EA, and a collar of twice the height."""
     part = {"length": length / parts, "mass_per_length": 1.0, "bending_stiffness": 100.0,
             "axial_stiffness": 12 * 100.0 / 0.1**2, "polar_inertia_per_length": 1e-3,
             "modes": {"y": 2}}  # fmt: skip
     beams = [part | {"name": f"part{k}"} for k in range(parts)]
+    if collar is not None:
+        beams[collar] |= {"bending_stiffness": 16 * 100.0, "axial_stiffness": 4 * 12e4}
     hinges: list[dict[str, Any]] = [
         {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "part0"}
     ]
@@ -166,6 +169,11 @@ def test_beams_welded_in_line_are_judged_as_one() -> None:
     assert 'beam "part0": its line of welded beams is 8 times the height' in warning
     assert len(welded(4, 2.0, angle=1.0).warnings) == 4
     assert len(welded(4, 2.0, kind="pin").warnings) == 4
+
+
+def test_a_short_thick_piece_does_not_make_a_line_short() -> None:
+    """A collar of twice the height on a tenth of a shaft that is 15 heights long."""
+    assert welded(10, 1.5, collar=4).warnings == ()
 
 
 def test_a_beam_welded_tip_to_tip_is_in_line_too() -> None:

@@ -48,6 +48,23 @@ def test_a_bennett_linkage_keeps_what_its_numbers_allow(digits: int, angle: floa
     assert np.abs(found.q - exact(angle).q).max() < 1e3 * size + 1e-7
 
 
+@pytest.mark.parametrize("digits", [4, 5, 6])
+def test_rounded_numbers_are_named_as_the_cause(digits: int) -> None:
+    """The gap of the row that is left out is that of the numbers, and no tolerance closes it."""
+    found = run(bennett(0.7, 6.0, digits), certify=True)
+    risks = {risk.name: risk for risk in found.risks}
+    gap = risks["nearly-redundant"]
+    assert gap.figure is not None and 0.1 < gap.figure * 10.0**digits < 1e2
+    assert "make the axes and lengths of the loop agree" in gap.remedy
+    assert all("rtol" not in risk.remedy for risk in found.risks)
+    assert not found.trusted
+
+
+def test_exact_numbers_leave_no_gap() -> None:
+    closure = run(bennett(0.7, 6.0), certify=True).certificate.closure
+    assert closure is not None and closure.misfit == 0.0
+
+
 @pytest.mark.parametrize("digits", [None, 6])
 def test_it_does_not_tell_where_a_run_began(digits: int | None) -> None:
     """The same motion from the pose drawn at its start, and from those that it comes through."""
