@@ -13,7 +13,7 @@ from ..array_validation import Array
 from ..errors import NumericalFailure
 from ..pipeline.extended_precision import extended_precision_accelerations, relative_error
 from ..runtime.flexible.beam.dynamic_stiffness import Direction
-from ..runtime.flexible.beam.shape_functions import root
+from ..runtime.flexible.beam.shape_functions import wave_number
 from ..runtime.model.model import Model
 from ..runtime.result.result import Result
 from .shared_scenes import (
@@ -105,7 +105,7 @@ def bending_error(
     The arguments are those of `solid_bar`.
     """
     frequency = solid_bar(slenderness, divisions, order, poisson).modes(1).omega[0]
-    beam_frequency = root("clamped-free", 1) ** 2 / (slenderness * math.sqrt(12))
+    beam_frequency = wave_number("clamped-free", 1) ** 2 / (slenderness * math.sqrt(12))
     return abs(float(frequency) / beam_frequency - 1)
 
 

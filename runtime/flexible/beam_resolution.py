@@ -1,8 +1,8 @@
-"""Up to which frequency the shapes of a beam hold, with its ends as the scene has them.
+"""Highest frequency that the shapes of a beam resolve, under the boundary conditions of the scene.
 
-Per direction the natural motions of the shapes, and of the whole beam, are compared with those of a
-fine division into elements: once with all ends but the held one free, once with those held by which
-others hang that are heavy or take moments.  The true ends lie between.
+Per direction, the natural frequencies of the shapes (with the rigid motions of the beam) are
+compared with those of a fine finite-element model: once with all ends free but the inboard one,
+once with those ends fixed that carry heavy bodies or moments.  The true conditions lie between.
 """
 
 from __future__ import annotations
@@ -16,85 +16,92 @@ from mstmm.array_validation import Array
 from .beam.boundary_conditions import BoundaryConditions
 from .beam.section_ports import BeamShapes
 from .beam.shape_fields import ROW
-from .beam.static_shapes import bending_matrices, divided, node_at, rod_matrices
+from .beam.static_shapes import bending_matrices, element_nodes, nearest_node, rod_matrices
 from .resolution import resolved_frequency
 
 
-def beam_resolution(shapes: BeamShapes, held: BoundaryConditions) -> float:
-    """rad/s up to which the shapes of a beam hold in all directions that it has some in; infinite
-    without any."""
+def beam_resolution(shapes: BeamShapes, conditions: BoundaryConditions) -> float:
+    """Highest frequency (rad/s) resolved in all directions with shapes; infinite without any."""
     directions = dict.fromkeys(mode.direction for mode in shapes.modes)
-    return min((_of_direction(shapes, held, d) for d in directions), default=np.inf)
+    return min((_resolution(shapes, conditions, d) for d in directions), default=np.inf)
 
 
-def _of_direction(shapes: BeamShapes, held: BoundaryConditions, direction: str) -> float:
-    own = [k for k, mode in enumerate(shapes.modes) if mode.direction == direction]
-    nodes = divided(shapes.data, len(own) + 2, (held.x, *(end.x for end in held.ends)))
+def _resolution(shapes: BeamShapes, conditions: BoundaryConditions, direction: str) -> float:
+    indices = [k for k, mode in enumerate(shapes.modes) if mode.direction == direction]
+    nodes = element_nodes(
+        shapes.data, len(indices) + 2, (conditions.x, *(end.x for end in conditions.ends))
+    )
     bends = direction in ("y", "z")
     if bends:
         k, m = bending_matrices(shapes.data, direction, nodes)
     else:
         nodes, k, m = rod_matrices(shapes.data, direction, nodes)
-    columns = _columns(shapes, own, direction, nodes)
-    least = np.inf
-    for fixed in _conditions(held, direction, nodes):
-        loose = _null_space(columns[fixed, len(own) :]).shape[1]
-        both = (_frequencies(k, m, span, fixed)[loose:] for span in (columns, None))
-        least = min(least, resolved_frequency(*both) or np.inf)
-    return least
+    columns = _nodal_columns(shapes, indices, direction, nodes)
+    lowest = np.inf
+    for fixed in _fixed_unknowns(conditions, direction, nodes):
+        rigid_count = _null_space(columns[fixed, len(indices) :]).shape[1]
+        shapes_only, all_motions = (_frequencies(k, m, span, fixed) for span in (columns, None))
+        resolved = resolved_frequency(shapes_only[rigid_count:], all_motions[rigid_count:])
+        lowest = min(lowest, resolved or np.inf)
+    return lowest
 
 
-def _columns(shapes: BeamShapes, own: list[int], direction: str, nodes: Array) -> Array:
-    """(unknowns, shapes and motions of the whole beam): values, and slopes of bending, at nodes."""
-    values = shapes.rows(nodes, 0)[ROW[direction], own].T
+def _nodal_columns(shapes: BeamShapes, indices: list[int], direction: str, nodes: Array) -> Array:
+    """Nodal values and bending slopes (unknowns, n) of the shapes, then of the rigid motions."""
+    shape_values = shapes.rows(nodes, 0)[ROW[direction], indices].T
     if direction not in ("y", "z"):
-        return np.column_stack([values, np.ones(len(nodes))])
-    found = np.zeros((2 * len(nodes), len(own) + 2))
-    found[0::2, :-2], found[1::2, :-2] = values, shapes.rows(nodes, 1)[ROW[direction], own].T
-    found[0::2, -2], found[0::2, -1], found[1::2, -1] = 1.0, nodes, 1.0
-    return found
+        return np.column_stack([shape_values, np.ones(len(nodes))])
+    columns = np.zeros((2 * len(nodes), len(indices) + 2))
+    columns[0::2, :-2] = shape_values
+    columns[1::2, :-2] = shapes.rows(nodes, 1)[ROW[direction], indices].T
+    columns[0::2, -2], columns[0::2, -1], columns[1::2, -1] = 1.0, nodes, 1.0
+    return columns
 
 
-def _conditions(held: BoundaryConditions, direction: str, nodes: Array) -> Iterator[list[int]]:
-    """Unknowns that are held: by the hinge alone, and by all that hangs on the beam too."""
+def _fixed_unknowns(
+    conditions: BoundaryConditions, direction: str, nodes: Array
+) -> Iterator[list[int]]:
+    """Fixed unknowns: by the inboard hinge alone, then also by what the other ends carry."""
     bends = direction in ("y", "z")
-    turns = direction in held.turns
-    first = node_at(nodes, held.x)
+    turns_freely = direction in conditions.turns
+    held_node = nearest_node(nodes, conditions.x)
     if bends:
-        hinge = [] if held.moves else [2 * first]
-        hinge += [] if turns else [2 * first + 1]
+        by_hinge = [] if conditions.moves else [2 * held_node]
+        by_hinge += [] if turns_freely else [2 * held_node + 1]
     else:
-        free = turns if direction == "twist" else held.moves
-        hinge = [] if free else [first]
-    yield hinge
-    others = list(hinge)
-    for end in held.ends:
-        place = node_at(nodes, end.x)
-        carries = direction in end.moments
+        free = turns_freely if direction == "twist" else conditions.moves
+        by_hinge = [] if free else [held_node]
+    yield by_hinge
+    by_loads = list(by_hinge)
+    for end in conditions.ends:
+        node = nearest_node(nodes, end.x)
+        carries_moment = direction in end.moments
         if bends:
-            others += [2 * place] if end.heavy else []
-            others += [2 * place + 1] if carries and end.heavy else []
+            by_loads += [2 * node] if end.heavy else []
+            by_loads += [2 * node + 1] if carries_moment and end.heavy else []
         elif end.heavy:
-            others.append(place)
-    if set(others) != set(hinge):
-        yield sorted(set(others))
+            by_loads.append(node)
+    if set(by_loads) != set(by_hinge):
+        yield sorted(set(by_loads))
 
 
 def _frequencies(k: Array, m: Array, columns: Array | None, fixed: list[int]) -> Array:
-    """rad/s, ascending, of motions that hold the unknowns `fixed`, within the span of `columns`
-    (None: all motions)."""
+    """Natural frequencies (rad/s, ascending) with the unknowns `fixed`, in the span of `columns`.
+
+    `columns` None stands for all motions.
+    """
     free = np.setdiff1d(np.arange(len(k)), fixed)
-    kept = np.eye(len(k))[:, free] if columns is None else columns @ _null_space(columns[fixed])
-    if not kept.shape[1]:
+    basis = np.eye(len(k))[:, free] if columns is None else columns @ _null_space(columns[fixed])
+    if not basis.shape[1]:
         return np.zeros(0)
-    lower = np.linalg.cholesky(kept.T @ m @ kept)
-    half = np.linalg.solve(lower, kept.T @ k @ kept)
+    lower = np.linalg.cholesky(basis.T @ m @ basis)
+    half = np.linalg.solve(lower, basis.T @ k @ basis)
     squares = np.linalg.eigvalsh(np.linalg.solve(lower, half.T))
     return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
 
 
 def _null_space(rows: Array) -> Array:
-    """(n, m) orthonormal coefficients of n columns whose rows vanish."""
+    """Orthonormal null space (n, m) of `rows` (., n)."""
     if not len(rows):
         return np.eye(rows.shape[1])
     _, values, vectors = np.linalg.svd(rows)

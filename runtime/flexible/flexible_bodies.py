@@ -1,4 +1,4 @@
-"""Every flexible body of a scene as numbers."""
+"""The flexible bodies of a scene as `ModalBody`."""
 
 from __future__ import annotations
 
@@ -12,15 +12,14 @@ if TYPE_CHECKING:
 
 
 def modal_bodies(scene: Scene) -> dict[str, ModalBody]:
-    """Name -> body, beams in the scene's order and then elastic bodies; those with
-    model = "rigid" are left out.
+    """Modal bodies by name: beams, then elastic bodies; those with model = "rigid" are left out.
 
     Raises SceneError for a body whose shapes, matrices or ports do not fit.
     """
     beams = BeamBodies(scene)
-    found = {b.name: beams.body(b) for b in scene.beam if b.model != "rigid"}
+    bodies = {beam.name: beams.body(beam) for beam in scene.beam if beam.model != "rigid"}
     if scene.elastic:
         from .elastic.modal_elastic import elastic_bodies
 
-        found |= elastic_bodies(scene)
-    return found
+        bodies |= elastic_bodies(scene)
+    return bodies

@@ -1,4 +1,4 @@
-"""Flexible bodies and their sections -> inputs of the kernels that sweep them."""
+"""Kernel inputs of flexible bodies and of their sections, and changes of the frame of a body."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 _CYCLIC = ((1, 2), (2, 0), (0, 1))
 
 
-def moments_of(body: Moments) -> dict[str, Array]:
+def moment_inputs(body: Moments) -> dict[str, Array]:
     """Inputs p, C, P, B, Z_xx.., Y_x.., G_x.., M of the kernels of ("sweep", "modal").
 
-    See `derive.flexible.symbols` for what they are.
+    They are defined in `derive.flexible.modal_symbols`.
     """
     e, f, g, x = body.E, body.F, body.G, body.X
-    found = {
+    inputs = {
         "p": np.array([body.mass, *body.first, *(body.second[a, b] for a, b in _PAIRS)]),
         "C": body.C,
         "P": np.array([e[a, b] - e[b, a] for a, b in _CYCLIC]),
@@ -32,73 +32,77 @@ def moments_of(body: Moments) -> dict[str, Array]:
     }
     for a, b in _PAIRS:
         name = "xyz"[a] + "xyz"[b]
-        found[f"Z_{name}"] = f[a, b] + f[a, b].T - x[a, b] - x[b, a]
+        inputs[f"Z_{name}"] = f[a, b] + f[a, b].T - x[a, b] - x[b, a]
     for i, (a, b) in enumerate(_CYCLIC):
-        found[f"Y_{'xyz'[i]}"] = (f[a, b] - x[a, b]) - (f[b, a] - x[b, a])
+        inputs[f"Y_{'xyz'[i]}"] = (f[a, b] - x[a, b]) - (f[b, a] - x[b, a])
     for i in range(3):
-        found[f"G_{'xyz'[i]}"] = g[i]
-    found["M"] = f[0, 0] + f[1, 1] + f[2, 2]
-    return found
+        inputs[f"G_{'xyz'[i]}"] = g[i]
+    inputs["M"] = f[0, 0] + f[1, 1] + f[2, 2]
+    return inputs
 
 
 def section_inputs(port: ModalPort) -> dict[str, Array]:
     """Inputs r, phi, theta, g_x .. h_z of the kernel "section" of ("sweep", "modal")."""
-    second = [f"{kind}_{axis}" for kind in "gh" for axis in "xyz"]
+    names = [f"{kind}_{axis}" for kind in "gh" for axis in "xyz"]
     return {"r": port.position, "phi": port.phi, "theta": port.theta} | dict(
-        zip(second, port.second_order, strict=True)
+        zip(names, port.second_order, strict=True)
     )
 
 
 M = TypeVar("M", bound=Moments)
 
 
-def in_frame(body: ModalBody, rotation: Array, origin: Array) -> ModalBody:
-    """The same body in other axes about another origin: `rotation` (3, 3) new axes to old ones,
-    `origin` (3,) in old axes, m."""
-    r, o = rotation, origin
-    if np.array_equal(r, np.eye(3)) and not np.any(o):
+def transform_body(body: ModalBody, rotation: Array, origin: Array) -> ModalBody:
+    """Body in other axes about another origin.
+
+    `rotation` (3, 3) turns new axes to old ones; `origin` (3,) is in old axes, m.
+    """
+    axes, shift = rotation, origin
+    if np.array_equal(axes, np.eye(3)) and not np.any(shift):
         return body
     return replace(
-        _moved(body, r, o),
-        ports={name: section_in(port, r, o) for name, port in body.ports.items()},
-        points=tuple(replace(p, port=section_in(p.port, r, o)) for p in body.points),
-        drag=None if body.drag is None else _moved(body.drag, r, o),
+        _transform_moments(body, axes, shift),
+        ports={name: transform_section(port, axes, shift) for name, port in body.ports.items()},
+        points=tuple(
+            replace(point, port=transform_section(point.port, axes, shift)) for point in body.points
+        ),
+        drag=None if body.drag is None else _transform_moments(body.drag, axes, shift),
     )
 
 
-def _moved(body: M, r: Array, o: Array) -> M:
-    """Moments about another origin o, in axes r."""
-    first = body.first - body.mass * o
-    second = body.second - np.outer(o, body.first) - np.outer(first, o)
-    e = body.E - o[:, None, None] * body.C[None]
-    x = body.X - o[:, None, None, None] * body.G[None]
+def _transform_moments(body: M, rotation: Array, origin: Array) -> M:
+    """Moments about another origin, in the axes `rotation`."""
+    first = body.first - body.mass * origin
+    second = body.second - np.outer(origin, body.first) - np.outer(first, origin)
+    e = body.E - origin[:, None, None] * body.C[None]
+    x = body.X - origin[:, None, None, None] * body.G[None]
     return replace(
         body,
-        first=r.T @ first,
-        second=r.T @ second @ r,
-        C=r.T @ body.C,
-        E=np.einsum("ia,jb,ijk->abk", r, r, e),
-        F=np.einsum("ia,jb,ijkl->abkl", r, r, body.F),
-        G=_turned(r, body.G),
-        X=np.einsum("ia,jb,ijkl->abkl", r, r, x),
+        first=rotation.T @ first,
+        second=rotation.T @ second @ rotation,
+        C=rotation.T @ body.C,
+        E=np.einsum("ia,jb,ijk->abk", rotation, rotation, e),
+        F=np.einsum("ia,jb,ijkl->abkl", rotation, rotation, body.F),
+        G=_rotate_components(rotation, body.G),
+        X=np.einsum("ia,jb,ijkl->abkl", rotation, rotation, x),
     )
 
 
-def section_in(port: ModalPort, rotation: Array, origin: Array) -> ModalPort:
-    """A section in other axes about another origin."""
+def transform_section(port: ModalPort, rotation: Array, origin: Array) -> ModalPort:
+    """Section in other axes about another origin; arguments as in `transform_body`."""
     r = rotation
     return ModalPort(
         r.T @ (port.position - origin), r.T @ port.rotation, r.T @ port.phi, r.T @ port.theta,
-        np.concatenate([_turned(r, port.second_order[:3]), _turned(r, port.second_order[3:])]),
+        np.concatenate([_rotate_components(r, part) for part in np.split(port.second_order, 2)]),
     )  # fmt: skip
 
 
-def _turned(rotation: Array, vectors: Array) -> Array:
-    """Components (3, n, n) in other axes."""
+def _rotate_components(rotation: Array, vectors: Array) -> Array:
+    """Components (3, n, n) in the axes `rotation`."""
     return np.asarray(np.einsum("ia,ikl->akl", rotation, vectors))
 
 
-def massless(body: ModalBody) -> ModalBody:
-    """The frame node of a body whose mass stands in points: stiffness and damping alone."""
-    zero = {name: np.zeros_like(getattr(body, name)) for name in "CEFGX"}
-    return replace(body, mass=0.0, first=np.zeros(3), second=np.zeros((3, 3)), **zero)
+def without_mass(body: ModalBody) -> ModalBody:
+    """Body with stiffness and damping alone, for a body whose mass sits in points."""
+    zeros = {name: np.zeros_like(getattr(body, name)) for name in "CEFGX"}
+    return replace(body, mass=0.0, first=np.zeros(3), second=np.zeros((3, 3)), **zeros)

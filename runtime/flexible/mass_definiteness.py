@@ -1,9 +1,10 @@
-"""Does the mass matrix of a stiffened body stay positive definite as far as its model goes?
+"""Positive definiteness of the mass matrix of a stiffened body over the range of its model.
 
-Cut off after the second order, M(eta) of `derive.flexible.modal` is definite only for deflections
-that are not too large: where the shapes can take up nearly all inertia, terms of eta soon exceed
-what is left.  Here it is formed, by the generated kernels, for many deflections whose sections turn
-by as much as the model is made for, as what moves the held end sees it.
+The mass matrix M(eta) of `derive.flexible.modal_residual` is cut off after second order, so that it
+is definite only for moderate deflections: where the shapes represent nearly all inertia, terms in
+eta soon exceed the rest.  The check evaluates M(eta) with the generated kernels for many
+deflections whose sections rotate as far as the model is valid, for the motions that the support
+allows.
 """
 
 from __future__ import annotations
@@ -18,8 +19,8 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 
 from ..kernels.numpy_kernels import evaluate
-from .kernel_inputs import moments_of, section_inputs
-from .memory_chunks import slices
+from .kernel_inputs import moment_inputs, section_inputs
+from .memory_chunks import chunk_slices
 from .modal_kernels import kernel
 from .modal_scales import modal_sizes
 from .support_motion import ANY, Support
@@ -29,68 +30,69 @@ if TYPE_CHECKING:
     from .modal_port import ModalPort
 
 
-#: Largest rotation of a section against the frame for which a model is made, rad, and the margin
-#: over it: deflections are drawn, and the worst is not among them.
+#: Largest valid rotation of a section relative to the frame, rad, and a margin over it, because
+#: random deflections do not include the worst one.
 SLOPE, MARGIN = 0.3, 1.25
 
-#: Deflections drawn besides the shapes themselves and what forces on the ends bring.
-_DRAWN = 48
-#: What turns no section goes as far as this part of what it would at a rotation of 1 rad.
-_STRETCH = 0.1
-#: Inertia below this part of the largest is none: a straight beam about its own axis.
-_NONE = 1e-13
+#: Random deflections, besides the shapes and the static deflections under loads on the ends.
+_RANDOM_COUNT = 48
+#: Amplitude of shapes that rotate no section, as a share of their modal scale.
+_UNTURNED_SHARE = 0.1
+#: Share of the largest inertia that counts as none, as of a straight beam about its own axis.
+_NO_INERTIA = 1e-13
 
 
-def stays_definite(body: ModalBody, held: ModalPort, support: Support, turns: Array) -> bool:
-    """Whether every deflection drawn leaves a positive inertia to every motion.
+def is_mass_definite(body: ModalBody, held: ModalPort, support: Support, rotations: Array) -> bool:
+    """Whether the mass matrix is positive definite at every test deflection.
 
-    `turns` (places, 3, n) are the rotations of sections per mode, rad.  What hangs on the other
-    ends only adds inertia and is left out.
+    `rotations` (sections, 3, n) are the rotation vectors of sections per mode, rad.  Bodies on the
+    other ends only add inertia and are left out.
     """
     if not np.any(body.G) and not np.any(body.X):
-        return True  # M is the exact integral of squares
+        return True  # M is the exact integral of a square
     if not held.moves and not support.speeds:
-        return True  # what is left is the constant matrix of the modes
-    return is_definite_at(body, held, support, _deflections(body, turns))
+        return True  # only the constant modal mass matrix remains
+    return is_definite_at(body, held, support, _test_deflections(body, rotations))
 
 
-def depends_on_count(body: ModalBody, held: str, support: Support, turns: Array) -> bool:
-    """Whether a body that does not stay definite would with its first shape alone."""
-    port = {"phi": (slice(None), slice(1)), "theta": (slice(None), slice(1)),
+def is_definite_with_first_shape(
+    body: ModalBody, held: str, support: Support, rotations: Array
+) -> bool:
+    """Whether the mass matrix would be positive definite with the first shape alone."""
+    cuts = {"phi": (slice(None), slice(1)), "theta": (slice(None), slice(1)),
             "second_order": (slice(None), slice(1), slice(1))}  # fmt: skip
-    one = replace(
+    reduced = replace(
         body, modes=body.modes[:1], C=body.C[:, :1], E=body.E[..., :1], F=body.F[..., :1, :1],
         G=body.G[:, :1, :1], X=body.X[..., :1, :1], K=body.K[:1, :1], D=body.D[:1, :1],
         shapes=None,
         ports={
-            name: replace(end, **{key: getattr(end, key)[cut] for key, cut in port.items()})
-            for name, end in body.ports.items()
+            name: replace(port, **{key: getattr(port, key)[cut] for key, cut in cuts.items()})
+            for name, port in body.ports.items()
         },
     )  # fmt: skip
-    return stays_definite(one, one.ports[held], support, turns[..., :1])
+    return is_mass_definite(reduced, reduced.ports[held], support, rotations[..., :1])
 
 
 def is_definite_at(body: ModalBody, held: ModalPort, support: Support, eta: Array) -> bool:
-    """Whether deflections (N, n) leave a positive inertia to every motion that has one without."""
-    inertia = _Inertia(body, held, np.concatenate([np.zeros((1, body.n)), eta]))
-    for way in (support, ANY):
-        kept, scale = _scale(next(inertia.on(way)))
-        scaled = (m[:, kept[:, None], kept] / scale for m in inertia.on(way))
-        if _is_definite(next(scaled)):
-            return all(map(_is_definite, scaled))
-    return True  # what a straight body lacks is not lost by bending
+    """Whether M is positive definite at deflections (N, n), for motions with inertia at eta = 0."""
+    mass_matrices = _MassMatrices(body, held, np.concatenate([np.zeros((1, body.n)), eta]))
+    for motion in (support, ANY):
+        kept, scale = _scale_of_motions(next(mass_matrices.matrices(motion)))
+        scaled = (m[:, kept[:, None], kept] / scale for m in mass_matrices.matrices(motion))
+        if _all_definite(next(scaled)):
+            return all(map(_all_definite, scaled))
+    return True  # M is singular without deflection, so that the test has no meaning
 
 
-def _scale(straight: Array) -> tuple[NDArray[np.intp], Array]:
-    """Motions that a matrix (1, ., .) has an inertia for, and the roots of their own inertias,
-    products of two."""
-    own = np.diagonal(straight[0])
-    kept = np.flatnonzero(own > _NONE * own.max(initial=0.0))
-    root = np.sqrt(own[kept])
+def _scale_of_motions(undeformed: Array) -> tuple[NDArray[np.intp], Array]:
+    """Indices of motions with inertia in a matrix (1, ., .), and a scale for each matrix entry."""
+    diagonal = np.diagonal(undeformed[0])
+    kept = np.flatnonzero(diagonal > _NO_INERTIA * diagonal.max(initial=0.0))
+    root = np.sqrt(diagonal[kept])
     return kept, np.outer(root, root)
 
 
-def _is_definite(matrices: Array) -> bool:
+def _all_definite(matrices: Array) -> bool:
     try:
         np.linalg.cholesky(matrices)
     except np.linalg.LinAlgError:
@@ -101,74 +103,82 @@ def _is_definite(matrices: Array) -> bool:
 # --- deflections ----------------------------------------------------------------------------------
 
 
-def _deflections(body: ModalBody, turns: Array) -> Array:
-    """(N, n) deflections whose largest rotation is SLOPE with its margin."""
-    straight = ~turns.any(axis=(0, 1))
-    sizes = modal_sizes(body) * np.where(straight, _STRETCH, 1.0)
-    random = np.random.default_rng(0).normal(size=(_DRAWN, body.n))
-    softest = np.sqrt(np.diag(body.K)) * sizes
+def _test_deflections(body: ModalBody, rotations: Array) -> Array:
+    """Deflections (N, n) whose largest rotation of a section is SLOPE * MARGIN."""
+    unturned = ~rotations.any(axis=(0, 1))
+    scales = modal_sizes(body) * np.where(unturned, _UNTURNED_SHARE, 1.0)
+    drawn = np.random.default_rng(0).normal(size=(_RANDOM_COUNT, body.n))
+    root_energies = np.sqrt(np.diag(body.K)) * scales
     loads = [body.C, *(np.concatenate([p.phi, p.theta]) for p in body.ports.values())]
-    bent = np.linalg.lstsq(body.K, np.concatenate(loads).T, rcond=None)[0].T
-    rows = [sizes * np.eye(body.n), bent, sizes * random, sizes * random / softest]
+    static = np.linalg.lstsq(body.K, np.concatenate(loads).T, rcond=None)[0].T
+    rows = [scales * np.eye(body.n), static, scales * drawn, scales * drawn / root_energies]
     directions = np.concatenate(rows)
     directions = directions[np.abs(directions).max(axis=1) > 0]
-    largest = np.linalg.norm(np.einsum("man,kn->kma", turns, directions), axis=2).max(axis=1)
-    moved = np.abs(directions / sizes)[:, straight].max(axis=1, initial=0.0)
-    return np.asarray(directions * (SLOPE * MARGIN / np.maximum(largest, moved))[:, None])
+    rotation = np.linalg.norm(np.einsum("man,kn->kma", rotations, directions), axis=2).max(axis=1)
+    stretch = np.abs(directions / scales)[:, unturned].max(axis=1, initial=0.0)
+    return np.asarray(directions * (SLOPE * MARGIN / np.maximum(rotation, stretch))[:, None])
 
 
 # --- mass matrix ----------------------------------------------------------------------------------
 
 
-class _Inertia:
-    """Mass matrices at deflections eta (N, n), as what the held end rides on sees them."""
+class _MassMatrices:
+    """Mass matrices of a body and its support at deflections eta (N, n)."""
 
     def __init__(self, body: ModalBody, held: ModalPort, eta: Array) -> None:
         n, zero, self.held, self.Mff = body.n, np.zeros(3), held, body.Mff
-        given = {**moments_of(body), "eta": eta, "etad": np.zeros(n), "v": zero, "w": zero}
-        found = evaluate(kernel("momentum"), given, n)
-        self.S, self.S_rf = np.empty((len(eta), 6, 6)), found["S_rf"]
+        inputs = {**moment_inputs(body), "eta": eta, "etad": np.zeros(n), "v": zero, "w": zero}
+        outputs = evaluate(kernel("momentum"), inputs, n)
+        self.S, self.S_rf = np.empty((len(eta), 6, 6)), outputs["S_rf"]
         rows, columns = np.triu_indices(6)
-        self.S[:, rows, columns] = self.S[:, columns, rows] = found["S"]
+        self.S[:, rows, columns] = self.S[:, columns, rows] = outputs["S"]
         back = held.rotation.T
-        self.ride, self.own = _shifted(back, -back @ held.position), np.zeros((len(eta), 6, n))
+        self.frame_by_end = _twist_transform(back, -back @ held.position)
+        self.frame_by_modes = np.zeros((len(eta), 6, n))
         if held.moves:
-            self.ride, self.own = _frame_motion(held, eta)
+            self.frame_by_end, self.frame_by_modes = _frame_twist(held, eta)
 
-    def on(self, support: Support) -> Iterator[Array]:
-        """(., m + n, m + n) for the speeds of the support and the modes, the first one and then
-        some at a time: M(eta) of [v; w; etad] in frame axes, with v, w by the speeds and etad."""
+    def matrices(self, support: Support) -> Iterator[Array]:
+        """Mass matrices (., m + n, m + n) over support speeds and modal speeds.
+
+        The first matrix comes alone, the rest in chunks.  They are M(eta) of [v; w; etad] in frame
+        axes, with the twist v, w of the frame expressed by both kinds of speeds.
+        """
         m, n = support.speeds, len(self.Mff)
-        moved = self.ride @ support.motion
-        pushed = self.S @ self.own + self.S_rf
-        corner = np.swapaxes(moved, -1, -2) @ self.S @ moved + support.inertia
-        edge = np.swapaxes(moved, -1, -2) @ pushed
-        for some in (slice(0, 1), *slices(len(self.S), (m + n) ** 2)):
-            own, free = np.swapaxes(self.own[some], 1, 2), np.swapaxes(self.S_rf[some], 1, 2)
-            whole = np.empty((len(own), m + n, m + n))
-            whole[:, :m, :m], whole[:, :m, m:] = corner[some], edge[some]
-            whole[:, m:, :m] = np.swapaxes(edge[some], 1, 2)
-            whole[:, m:, m:] = own @ pushed[some] + free @ self.own[some] + self.Mff
-            yield whole
+        twist = self.frame_by_end @ support.motion
+        coupling = self.S @ self.frame_by_modes + self.S_rf
+        corner = np.swapaxes(twist, -1, -2) @ self.S @ twist + support.inertia
+        edge = np.swapaxes(twist, -1, -2) @ coupling
+        for chunk in (slice(0, 1), *chunk_slices(len(self.S), (m + n) ** 2)):
+            by_modes = self.frame_by_modes[chunk]
+            modal = np.swapaxes(by_modes, 1, 2) @ coupling[chunk]
+            blocks = np.empty((len(by_modes), m + n, m + n))
+            blocks[:, :m, :m], blocks[:, :m, m:] = corner[chunk], edge[chunk]
+            blocks[:, m:, :m] = np.swapaxes(edge[chunk], 1, 2)
+            blocks[:, m:, m:] = modal + np.swapaxes(self.S_rf[chunk], 1, 2) @ by_modes + self.Mff
+            yield blocks
 
 
-def _frame_motion(held: ModalPort, eta: Array) -> tuple[Array, Array]:
-    """Twist of the frame by that of the held end (N, 6, 6) and by the modal speeds (N, 6, n)."""
-    given = section_inputs(held)
-    section = evaluate(kernel("section"), {**given, "eta": eta, "etad": 0 * eta}, eta.shape[1])
-    passed = {name: section[name] for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
-    inward = evaluate(kernel("inward"), {**passed, "R_end": held.rotation})
-    return _shifted(inward["R"], inward["d"]), inward["H6"] @ section["Phi"]
+def _frame_twist(held: ModalPort, eta: Array) -> tuple[Array, Array]:
+    """Twist of the frame per twist of the held end (N, 6, 6) and per modal speed (N, 6, n)."""
+    inputs = section_inputs(held)
+    section = evaluate(kernel("section"), {**inputs, "eta": eta, "etad": 0 * eta}, eta.shape[1])
+    section_outputs = {name: section[name] for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
+    inward = evaluate(kernel("inward"), {**section_outputs, "R_end": held.rotation})
+    return _twist_transform(inward["R"], inward["d"]), inward["H6"] @ section["Phi"]
 
 
-def _shifted(turn: Array, shift: Array) -> Array:
-    """(..., 6, 6): twist of an outboard point, its axes, from that of the inboard one; `turn`
-    outboard axes to inboard axes, `shift` from the inboard point, inboard axes."""
-    back = np.swapaxes(turn, -1, -2)
-    moved = np.zeros((*turn.shape[:-2], 6, 6))
-    moved[..., :3, :3] = moved[..., 3:, 3:] = back
+def _twist_transform(rotation: Array, shift: Array) -> Array:
+    """Transform (..., 6, 6) of the twist of an inboard point to that of an outboard one, its axes.
+
+    `rotation` turns outboard axes to inboard axes; `shift` leads from the inboard to the outboard
+    point, inboard axes, m.
+    """
+    inverse = np.swapaxes(rotation, -1, -2)
+    transform = np.zeros((*rotation.shape[:-2], 6, 6))
+    transform[..., :3, :3] = transform[..., 3:, 3:] = inverse
     x, y, z = (shift[..., k] for k in range(3))
-    o = np.zeros_like(x)
-    cross = np.stack([o, z, -y, -z, o, x, y, -x, o], axis=-1).reshape(*x.shape, 3, 3)
-    moved[..., :3, 3:] = back @ cross
-    return moved
+    zero = np.zeros_like(x)
+    cross = np.stack([zero, z, -y, -z, zero, x, y, -x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    transform[..., :3, 3:] = inverse @ cross
+    return transform

@@ -1,12 +1,12 @@
-"""Arrays of all pairs of shapes are handled in parts: of many shapes they fill gigabytes."""
+"""Chunks of large arrays: arrays of all pairs of many shapes would fill gigabytes."""
 
 from __future__ import annotations
 
-#: Numbers of one array that are handled together, 8 MB.
-_TOGETHER = 2**20
+#: Numbers per chunk, 8 MB.
+_CHUNK_SIZE = 2**20
 
 
-def slices(count: int, each: int) -> list[slice]:
-    """0 to `count` in parts of so many entries of `each` numbers as are handled together."""
-    step = max(1, _TOGETHER // max(1, each))
+def chunk_slices(count: int, entry_size: int) -> list[slice]:
+    """Slices from 0 to `count`, each of at most a chunk of entries of `entry_size` numbers."""
+    step = max(1, _CHUNK_SIZE // max(1, entry_size))
     return [slice(first, min(first + step, count)) for first in range(0, count, step)]

@@ -1,13 +1,12 @@
-"""ModalBody: the numbers of one flexible body, as the kernels and the results take them.
+"""ModalBody: one flexible body in its floating frame, as kernels and results use it.
 
-A point that lies at r0 in the undeformed body is displaced by
+A point at r0 of the undeformed body is displaced by
 
     u = phi(r0) eta - 1/2 eta^T g(r0) eta
 
 in the axes of the floating frame F, where phi holds one vector field per mode and g is the
-displacement of second order that bending and twist bring with them.  All
-integrals are over the mass of the undeformed body.  SI units; eta of bending and axial shapes in
-metres, of twist shapes in radians.
+second-order displacement due to bending and twist.  All integrals are over the mass of the
+undeformed body.  SI units; eta of bending and axial shapes in metres, of twist shapes in radians.
 """
 
 from __future__ import annotations
@@ -27,8 +26,11 @@ from .truncation import Truncation
 
 @dataclass(frozen=True)
 class Skin:
-    """What is seen of a body: nodes (N, 3) m at rest and phi (3, N, n), how its shapes move them,
-    frame axes; faces (m, 3) are triangles of nodes, none where only nodes are known."""
+    """Surface of a body for display, frame axes.
+
+    Undeformed `nodes` (N, 3) m; `phi` (3, N, n) their displacement per mode; `faces` (m, 3)
+    triangles of nodes, none where only nodes are known.
+    """
 
     nodes: Array
     phi: Array
@@ -37,14 +39,14 @@ class Skin:
 
 @dataclass(frozen=True)
 class ModalBody(Moments):
-    """One flexible body: the moments of its mass, stiffness, ports, and what it starts with.
+    """One flexible body: mass moments, stiffness, damping, ports and initial deformation.
 
     With `points` (quadrature variant) the mass sits in them and the moments are not used.
     `drag` are the moments of the viscous drag per length (N s/m^2 in place of kg/m; motion of the
-    axis only), None without drag.  `resolved` is the frequency in rad/s up to which the shapes of
-    an elastic body hold, `truncation` what they miss of its deflections, both None of beams.
-    `frame` says where the floating frame is: "tangent", "chord", "mean", or one of them per bending
-    plane ("chord/tangent": of y, of z).
+    axis only), None without drag.  `resolved` is the highest frequency (rad/s) that the shapes of
+    an elastic body resolve, `truncation` their truncation error in deflections; both None for
+    beams.  `frame` is the kind of floating frame: "tangent", "chord", "mean", or one of them per
+    bending plane ("chord/tangent": of y, of z).
     """
 
     name: str
@@ -63,7 +65,7 @@ class ModalBody(Moments):
     warnings: tuple[str, ...] = ()
     resolved: float | None = None
     truncation: Truncation | None = None
-    unmoved_frame: str = ""  #: the frame that it has with fewer shapes, where it is another one
+    unmoved_frame: str = ""  #: kind of frame with fewer shapes, if it differs
 
     @property
     def n(self) -> int:
@@ -72,5 +74,5 @@ class ModalBody(Moments):
 
     @property
     def Mff(self) -> Array:
-        """(n, n) mass matrix of the modes alone, the frame held."""
+        """Modal mass matrix (n, n), with the frame fixed."""
         return np.einsum("aakl->kl", self.F)

@@ -1,4 +1,4 @@
-"""The generated kernels of flexible bodies, as numpy evaluates them."""
+"""The generated kernels of flexible bodies, for evaluation by NumPy."""
 
 from __future__ import annotations
 
@@ -11,6 +11,6 @@ from mstmm.ir.json_format import kernel_from_json
 
 @cache
 def kernel(name: str) -> KernelIR:
-    """A kernel of the element "modal" by its name."""
+    """Kernel of the element "modal" with the given name."""
     text = files("mstmm.generated").joinpath("sweep_modal.json").read_text(encoding="utf-8")
     return kernel_from_json(text, name)

@@ -1,4 +1,4 @@
-"""Bodies whose numbers defeat linear algebra: refused by name."""
+"""Rejection of flexible bodies that cannot be computed in double precision."""
 
 from __future__ import annotations
 
@@ -14,22 +14,25 @@ if TYPE_CHECKING:
 
 
 def checked_result(what: str, make: Callable[[], ModalBody]) -> ModalBody:
-    """What `make` gives; SceneError naming `what`, such as 'beam "b"', where a matrix on the way is
-    singular or a number of the body overflows."""
+    """Body that `make` returns.
+
+    Raises SceneError naming `what`, such as 'beam "b"', for a singular matrix or an overflow.
+    """
     try:
         with np.errstate(all="ignore"):
             body = make()
     except np.linalg.LinAlgError as failure:
-        raise _refused(what, str(failure).lower()) from None
-    ports = [array for port in body.ports.values() for array in vars(port).values()]
-    numbers = [body.second, body.C, body.E, body.F, body.G, body.X, body.K, body.D, *ports]
-    if not all(np.isfinite(array).all() for array in numbers):
-        raise _refused(what, "overflow")
+        raise _precision_error(what, str(failure).lower()) from None
+    ports = [values for port in body.ports.values() for values in vars(port).values()]
+    arrays = [body.second, body.C, body.E, body.F, body.G, body.X, body.K, body.D, *ports]
+    if not all(np.isfinite(values).all() for values in arrays):
+        raise _precision_error(what, "overflow")
     return body
 
 
-def _refused(what: str, why: str) -> SceneError:
+def _precision_error(what: str, why: str) -> SceneError:
     return SceneError(
         f"{what}: its shapes and masses cannot be computed in double precision ({why}); look for "
-        "masses, stiffnesses or lengths of its parts that lie too far apart, or take fewer shapes"
+        "masses, stiffnesses or lengths that differ by too many orders of magnitude, or use fewer "
+        "shapes"
     )

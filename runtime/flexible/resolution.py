@@ -1,4 +1,4 @@
-"""Up to which frequency shapes hold: their natural motions beside those of a richer model."""
+"""Highest frequency that shapes resolve, by comparison with the modes of a richer model."""
 
 from __future__ import annotations
 
@@ -6,34 +6,41 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-#: Part by which a frequency may be too high for its motion still to be one of the shapes.
-_GOOD = 0.05
-#: Below this part of the first frequency a body follows its loads as at rest, to 12 %.
-_SLOW = 1 / 3
+#: Largest relative error (too high) of a natural frequency whose mode counts as resolved.
+_TOLERANCE = 0.05
+#: Share of the first frequency below which the static response to a load is right to 12 %.
+_QUASI_STATIC = 1 / 3
 
 
 def resolved_frequency(found: Array, expected: Array) -> float:
-    """The highest frequency (rad/s) up to which all motions are there and right to 5 %.
+    """Highest frequency (rad/s) up to which all modes are present and accurate to 5 %.
 
-    `found` (n,) of the shapes, `expected` of the richer model, both ascending and without motions
-    of the whole body.  Where the first is wrong already, a third of it.
+    `found` (n,) are natural frequencies of the shapes, `expected` those of the richer model, both
+    ascending and without rigid motions.  A third of the first one if that is already wrong.
     """
     count = min(len(found), len(expected))
     if not count:
         return 0.0
-    right = found[:count] <= (1 + _GOOD) * expected[:count]
-    good = count if right.all() else int(np.argmin(right))
-    return float(expected[good - 1]) if good else float(_SLOW * expected[0])
+    accurate = found[:count] <= (1 + _TOLERANCE) * expected[:count]
+    resolved_count = count if accurate.all() else int(np.argmin(accurate))
+    return (
+        float(expected[resolved_count - 1])
+        if resolved_count
+        else float(_QUASI_STATIC * expected[0])
+    )
 
 
 def ritz_frequencies(stiffness: Array, mass: Array) -> Array:
-    """(m,) rad/s, ascending, of motions that are spanned by n columns whose stiffness and mass
-    (n, n) these are; columns may repeat each other.  The stiffness is that of held columns."""
+    """Natural frequencies (m,) in the span of n assumed shapes, rad/s, ascending.
+
+    `stiffness` and `mass` (n, n) are those of the shapes, which may be linearly dependent and
+    contain no rigid motion.
+    """
     size = 1 / np.sqrt(np.maximum(np.diag(stiffness), 1e-300))
     scale = np.outer(size, size)
     values, vectors = np.linalg.eigh(stiffness * scale)
-    kept = values > 1e-12 * values.max(initial=0.0)
-    basis = vectors[:, kept] / np.sqrt(values[kept])
+    independent = values > 1e-12 * values.max(initial=0.0)
+    basis = vectors[:, independent] / np.sqrt(values[independent])
     inverse = np.linalg.eigvalsh(basis.T @ (mass * scale) @ basis)
     moving = inverse > 1e-14 * inverse.max(initial=0.0)
     return np.asarray(np.sort(1 / np.sqrt(inverse[moving])))

@@ -1,4 +1,4 @@
-"""What the shapes of an elastic body miss of its deflection under its loads."""
+"""Truncation error of the shapes of an elastic body in its static deflection."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from mstmm.array_validation import Array
 
 @dataclass(frozen=True)
 class Truncation:
-    """Deflection of an elastic body at rest under its loads, and what its shapes have of it.
+    """Static deflection of an elastic body under unit loads, in full and by its shapes.
 
     The loads are, in this order: force and moment (6) about the point of each of `ports`, the loads
     rho r0_a e_b (9, b running fastest) and -rho phi_k of a unit acceleration of each shape; body
-    axes, all in balance by rigid accelerations of the body.
+    axes, all balanced by rigid accelerations of the body.
 
     Attributes:
-        whole, kept: (6 p, m) displacement and rotation of the ports under a unit of each load, of
-            the whole body and of its shapes; against the mean motion of the mass.
+        whole, kept: (6 p, m) displacement and rotation of the ports per unit load, of the full
+            model and of the shapes, relative to the mean motion of the mass.
     """
 
     ports: tuple[str, ...]
@@ -27,12 +27,14 @@ class Truncation:
     kept: Array
 
     def missed(self, loads: Array, length: float) -> Array:
-        """(n,) part of the deflection of the ports under loads (n, m) that the shapes miss, 0 of
-        none; a radian counts as `length` (m)."""
+        """Share (n,) of the port deflection under `loads` (n, m) that the shapes do not represent.
+
+        A radian counts as `length` (m); 0 without deflection.
+        """
         sizes = np.tile(np.repeat([1.0, length], 3), len(self.ports))
         whole, missing = (
-            np.linalg.norm(loads @ (of * sizes[:, None]).T, axis=1)
-            for of in (self.whole, self.whole - self.kept)
+            np.linalg.norm(loads @ (deflection * sizes[:, None]).T, axis=1)
+            for deflection in (self.whole, self.whole - self.kept)
         )
         return np.divide(
             missing, whole, out=np.zeros_like(whole), where=(whole > 0) & np.isfinite(whole)

@@ -13,7 +13,13 @@ from mstmm.scene import Body, Hinge
 from mstmm.scene.checks.topology import BodyRow, Topology
 from mstmm.scene.tables.hinge_frames import hinge_frames, parameters_from_keys
 
-from ..flexible.kernel_inputs import in_frame, massless, moments_of, section_in, section_inputs
+from ..flexible.kernel_inputs import (
+    moment_inputs,
+    section_inputs,
+    transform_body,
+    transform_section,
+    without_mass,
+)
 from ..flexible.modal_body import ModalBody
 from . import denavit_hartenberg, frame_placement
 from .coordinate_layout import HingeSlots, Layout
@@ -121,7 +127,7 @@ class Bodies:
             return None, None  # the massless node of the section that is held
         modal = None
         if name in self.expanded.bodies:
-            turned = in_frame(body, np.array(place.rotation), np.array(place.origin))
+            turned = transform_body(body, np.array(place.rotation), np.array(place.origin))
             modal = _modal(turned, self.layout.modal[name])
         if passage is None:
             return modal, None
@@ -130,7 +136,7 @@ class Bodies:
         assert frame is not None
         if not passage.inward:
             own = self.placement(frame)
-            port = section_in(port, np.array(own.rotation), np.array(own.origin))
+            port = transform_section(port, np.array(own.rotation), np.array(own.origin))
         return modal, SectionNumbers(
             self.topology.place_of_body(frame), passage.inward, Arrays(section_inputs(port)),
             tuple(port.rotation.ravel().tolist()),
@@ -218,8 +224,8 @@ def _modal(body: ModalBody, slots: HingeSlots) -> ModalNumbers:
     """Of a body whose numbers are in the axes of its node."""
     return ModalNumbers(
         len(body.modes), slots.q, slots.u,
-        Arrays(moments_of(massless(body) if body.points else body)),
-        None if body.drag is None else Arrays(moments_of(body.drag)),
+        Arrays(moment_inputs(without_mass(body) if body.points else body)),
+        None if body.drag is None else Arrays(moment_inputs(body.drag)),
         Arrays({"stiffness": body.K, "damping": body.D}),
     )  # fmt: skip
 

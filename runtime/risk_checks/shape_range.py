@@ -12,7 +12,7 @@ from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
 from ..flexible.beam.beam_data import beam_data
-from ..flexible.beam.boundary_conditions import BeamEnvironment, holding
+from ..flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
 from ..flexible.beam_resolution import beam_resolution
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def _limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
         limit = body.resolved
         if body.shapes is not None and name in beams and around is not None:
             beam, data = beams[name], body.shapes.data
-            held = holding(around, beam, beam_data(beam))
+            held = boundary_conditions(around, beam, beam_data(beam))
             key = repr((beam.model_copy(update={"name": ""}), held, body.modes))
             if key not in alike:
                 alike[key] = beam_resolution(body.shapes, held) if data.mass else np.inf

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import mstmm
 from mstmm.runtime.flexible.elastic.craig_bampton import Reduction, reduce
 from mstmm.runtime.flexible.elastic.finite_element_model import ElasticModel
-from mstmm.runtime.flexible.elastic.interface_nodes import port
-from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies, model_of
+from mstmm.runtime.flexible.elastic.interface_nodes import select_port
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies, elastic_model
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 Array = NDArray[np.float64]
@@ -74,12 +74,12 @@ def short(elements: int = 5) -> dict[str, Any]:
 @cache
 def model(poisson: float = 0.3, elements: int = 20) -> ElasticModel:
     """Quadratic hexahedra in one row."""
-    return model_of(scene(table(poisson=poisson, box=short(elements))).elastic[0])
+    return elastic_model(scene(table(poisson=poisson, box=short(elements))).elastic[0])
 
 
 @cache
 def reduced(poisson: float, modes: int, frame: str = "tangent") -> Reduction:
     """The bar's shapes, with both ends loaded."""
     found, ends = model(poisson), scene(table()).elastic[0].ends
-    ports = [port(found, name, end, True) for name, end in ends.items()]
+    ports = [select_port(found, name, end, True) for name, end in ends.items()]
     return reduce(found, ports, ports[0], modes, frame)

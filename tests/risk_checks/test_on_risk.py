@@ -51,7 +51,7 @@ def test_what_a_body_s_model_lacks_has_its_way_out_apart() -> None:
     hold = {"name": "hold", "type": "fixed", "inboard": "ground", "outboard": "boom"}
     scene = mstmm.Scene(gravity=(0, -9.81, 0), beam=[beam], hinge=[hold])
     (risk,) = (r for r in mstmm.compile(scene).simulate(0.1).risks if r.name == "body-model")
-    assert risk.remedy == "give 2 or more" and "cannot carry" in risk.means
+    assert risk.remedy == "give 2 or more" and "cannot represent" in risk.means
 
 
 @pytest.mark.parametrize("wrong", [{"name": 1}, {"figure": "much"}, {"colour": "red"}])

@@ -10,7 +10,7 @@ from view import scenes
 
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
-from mstmm.runtime.flexible.elastic.modal_elastic import model_of
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_model
 from mstmm.runtime.flexible.elastic.surface_mesh import MOST, skin
 from mstmm.runtime.result.scene3d import body_geometry
 from mstmm.runtime.result.scene3d.camera import FIELD_OF_VIEW, choose_camera
@@ -186,7 +186,7 @@ def test_many_nodes_are_seen_by_some() -> None:
         gravity=[0, 0, 0], elastic=[fine],
         hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "block.root"}],
     ).elastic[0]  # fmt: skip
-    model = model_of(elastic)
+    model = elastic_model(elastic)
     assert model.faces is not None
     assert len(np.unique(model.faces)) == 6 * 14 * 14 + 2
     seen = skin(model, np.zeros((3 * len(model.nodes), 1)))

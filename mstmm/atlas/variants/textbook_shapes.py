@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...array_validation import Array
-from ...runtime.flexible.beam.shape_functions import root
+from ...runtime.flexible.beam.shape_functions import wave_number
 
 
 def clamped_free_shape(number: int, xi: Array) -> Array:
@@ -13,7 +13,7 @@ def clamped_free_shape(number: int, xi: Array) -> Array:
 
     Rao, Vibration of Continuous Systems, ch. 11; beta from the common root of all shapes.
     """
-    b = root("clamped-free", number)
+    b = wave_number("clamped-free", number)
     with np.errstate(over="ignore", invalid="ignore"):
         sigma = (np.cosh(b) + np.cos(b)) / (np.sinh(b) + np.sin(b))
         hyperbolic = np.cosh(b * xi) - sigma * np.sinh(b * xi)

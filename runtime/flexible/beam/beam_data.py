@@ -1,4 +1,4 @@
-"""A beam as numbers: sections, stiffnesses, ends; from the table of a scene."""
+"""Numerical data of a beam: sections, stiffnesses and ends, from its scene table."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BeamSections:
 
 @dataclass(frozen=True)
 class BeamData:
-    """A straight beam along x, its sections constant between `breaks`.
+    """A straight beam along x with constant sections between `breaks` (m).
 
     `inertia` (3, pieces): mass per length, int rho y^2 dA, int rho z^2 dA; `stiffness`
     (4, pieces): EA, GI_t, EI_y, EI_z.  `rotary`: whether bending turns the sections' inertia.
@@ -50,42 +50,44 @@ class BeamData:
 
     @property
     def uniform(self) -> bool:
-        """True when every section is the same."""
+        """Whether all sections are equal."""
         return len(self.breaks) == 2
 
     @property
     def mass(self) -> float:
-        """kg."""
+        """Mass, kg."""
         return float(self.inertia[0] @ np.diff(self.breaks))
 
     def piece(self, x: Array) -> NDArray[np.intp]:
-        """Which piece every x lies in; at a break the one behind it."""
-        found = np.searchsorted(np.asarray(self.breaks), x, side="right") - 1
-        return np.clip(found, 0, len(self.breaks) - 2)
+        """Index of the piece at every x (m); at a break that of the piece after it."""
+        indices = np.searchsorted(np.asarray(self.breaks), x, side="right") - 1
+        return np.clip(indices, 0, len(self.breaks) - 2)
 
     def sections(self, x: Array) -> BeamSections:
-        """Section data at every x."""
-        at = self.piece(x)
-        m, yy, zz = self.inertia[:, at]
-        ea, git, eiy, eiz = self.stiffness[:, at]
+        """Section data at every x (m)."""
+        pieces = self.piece(x)
+        m, yy, zz = self.inertia[:, pieces]
+        ea, git, eiy, eiz = self.stiffness[:, pieces]
         return BeamSections(
             m, ea, git, eiy, eiz, np.array([yy + zz, zz, yy]), np.full(m.shape, self.drag)
         )
 
 
 def beam_data(beam: Beam) -> BeamData:
-    """The numbers of a [[beam]] table."""
+    """Numerical data of a [[beam]] table."""
     pieces = beam.sections
     inertia, stiffness = [], []
-    for s in pieces:
-        polar = s.polar_inertia_per_length or 0.0
-        about_y, about_z = s.rotary_inertia or (polar / 2, polar / 2)
-        inertia.append((s.mass_per_length or 0.0, about_z, about_y))
-        bending = s.bending_stiffness or (0.0, 0.0)
-        stiffness.append((s.axial_stiffness or 0.0, s.torsional_stiffness or 0.0, *bending))
-    breaks = (*(float(s.from_) for s in pieces), float(beam.length))
+    for section in pieces:
+        polar = section.polar_inertia_per_length or 0.0
+        about_y, about_z = section.rotary_inertia or (polar / 2, polar / 2)
+        inertia.append((section.mass_per_length or 0.0, about_z, about_y))
+        bending = section.bending_stiffness or (0.0, 0.0)
+        stiffness.append(
+            (section.axial_stiffness or 0.0, section.torsional_stiffness or 0.0, *bending)
+        )
+    breaks = (*(float(section.from_) for section in pieces), float(beam.length))
     ends = {
-        name: (_snapped(end.position[0], breaks), np.array(end.rotation, dtype=float))
+        name: (_snap_to_break(end.position[0], breaks), np.array(end.rotation, dtype=float))
         for name, end in beam.ends.items()
     }
     return BeamData(
@@ -93,13 +95,13 @@ def beam_data(beam: Beam) -> BeamData:
         breaks,
         np.array(inertia, dtype=float).T,
         np.array(stiffness, dtype=float).T,
-        all(s.rotary_inertia is not None for s in pieces),
+        all(section.rotary_inertia is not None for section in pieces),
         float(beam.viscous_drag),
         ends,
     )
 
 
-def _snapped(x: float, breaks: tuple[float, ...]) -> float:
-    """The break that an end lies at but for rounding, or its own place on the beam."""
-    near = min(breaks, key=lambda b: abs(b - x))
-    return near if abs(near - x) <= 1e-9 * breaks[-1] else float(min(max(x, 0.0), breaks[-1]))
+def _snap_to_break(x: float, breaks: tuple[float, ...]) -> float:
+    """Position of an end, moved to a break that differs only by rounding."""
+    nearest = min(breaks, key=lambda place: abs(place - x))
+    return nearest if abs(nearest - x) <= 1e-9 * breaks[-1] else float(min(max(x, 0.0), breaks[-1]))

@@ -1,4 +1,4 @@
-"""Integrals over a beam: the generated integrands by Gauss quadrature along its pieces."""
+"""Integrals over a beam: generated integrands, Gauss quadrature along its pieces."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from mstmm.array_validation import Array
 
 from ..mass_moments import Moments
 from . import beam_kernels
-from .multilinear import Row, Term, Terms, add_products, known, rows_of, terms
+from .multilinear import Row, Term, Terms, add_products, kernel_terms, known_factor, shape_rows
 from .section_ports import BeamShapes, without_noise
 
 
 def mass_moments(shapes: BeamShapes) -> Moments:
-    """Moments of the mass, with what bending and twist turn of the sections' inertia."""
+    """Mass moments, including the rotary inertia of the sections in bending and twist."""
     x, w = shapes.rule()
     return _moments(shapes, shapes.data.inertia[:, shapes.data.piece(x)], x, w)
 
 
 def drag_moments(shapes: BeamShapes) -> Moments | None:
-    """Moments of the viscous drag per length, which acts on the axis alone; None without drag."""
+    """Moments of the viscous drag per length; it acts on the axis alone; None without drag."""
     if shapes.data.drag == 0.0:
         return None
     x, w = shapes.rule()
@@ -31,59 +31,67 @@ def drag_moments(shapes: BeamShapes) -> Moments | None:
 
 
 def stiffness(shapes: BeamShapes) -> Array:
-    """K (n, n) from the strain energy."""
+    """Stiffness matrix K (n, n) from the strain energy."""
     x, w = shapes.rule()
-    data = shapes.data.stiffness[:, shapes.data.piece(x)]
-    k = _integrals(shapes, np.concatenate([np.zeros((3, len(x))), data]), x, w, ("K",))[0][0]
+    sections = shapes.data.stiffness[:, shapes.data.piece(x)]
+    k = _integrals(shapes, np.concatenate([np.zeros((3, len(x))), sections]), x, w, ("K",))[0][0]
     k = (k + k.T) / 2
-    size = np.sqrt(np.abs(np.diag(k)))
-    return without_noise(k, np.outer(size, size))
+    scale = np.sqrt(np.abs(np.diag(k)))
+    return without_noise(k, np.outer(scale, scale))
 
 
-#: What the integrand of two shapes is linear in: in the place, the section, shape k and shape l.
-_FIRST = (
+#: Groups of inputs in which the integrand is linear: position, section data, shape k, shape l.
+_PAIR_GROUPS = (
     ("x",), ("inertia", "stiffness"),
     ("axis_k", "turn_k", "strain_k"), ("axis_l", "turn_l", "strain_l"),
 )  # fmt: skip
-#: The same of second order; last the displacement and rotation of second order at the section.
-_SECOND = (("x",), ("inertia",), ("turn_k",), ("turn_l",), ("g", "h_turn"))
+#: The same for the second-order integrand; the last group is the second-order field.
+_SECOND_ORDER_GROUPS = (("x",), ("inertia",), ("turn_k",), ("turn_l",), ("g", "h_turn"))
 
 
 def _integrals(
     shapes: BeamShapes, data: Array, x: Array, w: Array, names: tuple[str, ...]
 ) -> list[Array]:
-    """Integrals (..., n, n) of outputs of the kernel of two shapes, (..., n, 1) of those that one
-    shape has alone; `data` (7, m) are inertia and stiffness of the sections."""
-    values, slopes, bends = (shapes.rows(x, d) for d in range(3))
-    strain = np.stack([slopes[0], slopes[3], bends[2], bends[1]])
-    rows = rows_of(np.concatenate([values[:3], shapes.carried(slopes, values[3]), strain]))
-    every: Row = (np.zeros(1, dtype=np.intp), np.ones((1, len(x))))
-    found = []
-    for output in (terms("moments", *_FIRST)[name] for name in names):
-        paired = any(term.entries[-1] is not None for whole in output.values() for term in whole)
-        *_, last = output
-        total = np.zeros((*(k + 1 for k in last), shapes.n, shapes.n if paired else 1))
-        for index, term in _entries(output):
-            _, _, k, other = term.entries
-            assert k is not None
-            weights = known(term, x[None], data * w)[None]
+    """Integrals of the named outputs of the kernel "moments" over the beam.
+
+    They are (..., n, n) for outputs of two shapes and (..., n, 1) for outputs of one.  `data`
+    (7, m) are inertia and stiffness of the sections at the quadrature points.
+    """
+    values, slopes, curvatures = (shapes.rows(x, d) for d in range(3))
+    strain = np.stack([slopes[0], slopes[3], curvatures[2], curvatures[1]])
+    rows = shape_rows(np.concatenate([values[:3], shapes.carried(slopes, values[3]), strain]))
+    all_shapes: Row = (np.zeros(1, dtype=np.intp), np.ones((1, len(x))))
+    integrals = []
+    for output in (kernel_terms("moments", *_PAIR_GROUPS)[name] for name in names):
+        is_paired = any(term.entries[-1] is not None for whole in output.values() for term in whole)
+        *_, last_index = output
+        integral = np.zeros((*(k + 1 for k in last_index), shapes.n, shapes.n if is_paired else 1))
+        for index, term in _indexed_terms(output):
+            _, _, first, second = term.entries
+            assert first is not None
+            weights = known_factor(term, x[None], data * w)[None]
             add_products(
-                total[index][None], rows[k], every if other is None else rows[other], weights
+                integral[index][None],
+                rows[first],
+                all_shapes if second is None else rows[second],
+                weights,
             )
-        found.append(total)
-    return found
+        integrals.append(integral)
+    return integrals
 
 
 def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
     rigid = beam_kernels.evaluate("rigid", {"x": x[None, :], "inertia": density})
     mass = float(rigid["mass"][0] @ w)
     first = rigid["first"] @ w
-    second = _symmetric(rigid["second"] @ w)
+    second = _from_upper_triangle(rigid["second"] @ w)
     data = np.concatenate([density, np.zeros((4, len(x)))])
     c, e, f = _integrals(shapes, data, x, w, ("C", "E", "F"))
     modal = np.sqrt(np.abs(np.einsum("aakk->k", f)))
     lever = np.sqrt(np.abs(np.diag(second)))
-    g, moment = second_moments(shapes, density, x, w) if shapes.stiffening else _none(shapes.n)
+    g, moment = (
+        second_moments(shapes, density, x, w) if shapes.stiffening else _zero_moments(shapes.n)
+    )
     return Moments(
         mass=mass,
         first=first,
@@ -97,50 +105,52 @@ def _moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> Moments:
 
 
 def second_moments(shapes: BeamShapes, density: Array, x: Array, w: Array) -> tuple[Array, Array]:
-    """G (3, n, n) and X (3, 3, n, n) of the second-order field under a density (3, m) at the points
-    and weights of a quadrature."""
-    outputs = terms("second_moments", *_SECOND)
-    turn = rows_of(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]))
-    g, lever = _none(shapes.n)
-    of_field: dict[tuple[int | None, ...], list[tuple[Array, Term]]] = {}
-    for total, output in ((g, outputs["G"]), (lever, outputs["X"])):
-        for index, term in _entries(output):
-            _, _, k, other, field = term.entries
+    """Moments G (3, n, n) and X (3, 3, n, n) of the second-order field.
+
+    `density` (3, m) is given at the points `x` and weights `w` of a quadrature.
+    """
+    outputs = kernel_terms("second_moments", *_SECOND_ORDER_GROUPS)
+    rotations = shape_rows(shapes.carried(shapes.rows(x, 1), shapes.rows(x, 0)[3]))
+    g, x_moment = _zero_moments(shapes.n)
+    field_terms: dict[tuple[int | None, ...], list[tuple[Array, Term]]] = {}
+    for integral, output in ((g, outputs["G"]), (x_moment, outputs["X"])):
+        for index, term in _indexed_terms(output):
+            _, _, first, second, field = term.entries
             if field is not None:
-                of_field.setdefault(term.entries[:2], []).append((total[index], term))
-            elif k is not None and other is not None:
-                weights = known(term, x[None], density * w)[None]
-                add_products(total[index][None], turn[k], turn[other], weights)
-    of_places = np.stack([
-        known(Term(1.0, places), x[None], density * w) for places in of_field
+                field_terms.setdefault(term.entries[:2], []).append((integral[index], term))
+            elif first is not None and second is not None:
+                weights = known_factor(term, x[None], density * w)[None]
+                add_products(integral[index][None], rotations[first], rotations[second], weights)
+    point_weights = np.stack([
+        known_factor(Term(1.0, places), x[None], density * w) for places in field_terms
     ])  # fmt: skip
-    sums = shapes.second_order.sums(x, of_places, carried=True)
-    for entries, field in zip(of_field.values(), sums, strict=True):
-        for total, term in entries:
-            total += term.factor * field[term.entries[-1]]
-    turned, length = shapes.second_scale, shapes.length
+    field_sums = shapes.second_order.sums(x, point_weights, carried=True)
+    for entries, field in zip(field_terms.values(), field_sums, strict=True):
+        for integral, term in entries:
+            integral += term.factor * field[term.entries[-1]]
+    rotation, length = shapes.second_scale, shapes.length
     arms = np.array([density[0] @ w * length**2, density[1] @ w, density[2] @ w])
     return (
-        without_noise(_halved(g), density[0] @ w * length * turned),
-        without_noise(_halved(lever), arms[:, None, None, None] * turned),
+        without_noise(_symmetrise(g), density[0] @ w * length * rotation),
+        without_noise(_symmetrise(x_moment), arms[:, None, None, None] * rotation),
     )
 
 
-def _entries(output: Terms) -> Iterator[tuple[tuple[int, ...], Term]]:
+def _indexed_terms(output: Terms) -> Iterator[tuple[tuple[int, ...], Term]]:
     return ((index, term) for index, whole in output.items() for term in whole)
 
 
-def _halved(pairs: Array) -> Array:
-    """Symmetric in the last two axes."""
+def _symmetrise(pairs: Array) -> Array:
+    """Symmetric part in the last two axes."""
     return (pairs + np.swapaxes(pairs, -1, -2)) / 2
 
 
-def _none(n: int) -> tuple[Array, Array]:
+def _zero_moments(n: int) -> tuple[Array, Array]:
     return np.zeros((3, n, n)), np.zeros((3, 3, n, n))
 
 
-def _symmetric(upper: Array) -> Array:
-    """3 x 3 from its upper triangle, row by row."""
+def _from_upper_triangle(upper: Array) -> Array:
+    """Symmetric (3, 3) matrix from its upper triangle, row by row."""
     full = np.zeros((3, 3))
     full[np.triu_indices(3)] = upper
     return full + np.triu(full, 1).T

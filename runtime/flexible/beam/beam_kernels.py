@@ -1,4 +1,4 @@
-"""The generated kernels of the beam, evaluated for all shapes and points along it at once."""
+"""The generated kernels of the beam, vectorised over shapes and points along it."""
 
 from __future__ import annotations
 
@@ -21,18 +21,21 @@ def _kernels() -> dict[str, KernelIR]:
     return {kernel.name: kernel for kernel in element_from_json(text).kernels}
 
 
-def rows(name: str, port: str) -> int:
-    """Numbers of an input of a kernel."""
+def input_size(name: str, port: str) -> int:
+    """Number of entries of an input of a kernel."""
     return next(p.length() for p in _kernels()[name].inputs if p.name == port)
 
 
 def evaluate(name: str, inputs: Mapping[str, Array]) -> dict[str, Array]:
-    """Outputs of a kernel of the element "beam"; the axes of the points stand behind those of the
-    port, in inputs and outputs, and are broadcast against each other."""
+    """Outputs of a kernel of the element "beam".
+
+    In inputs and outputs the axes of a port come first; the axes of points after them broadcast.
+    """
     kernel = _kernels()[name]
     leading = {port.name: np.moveaxis(inputs[port.name], 0, -1) for port in kernel.inputs}
-    found = numpy_kernels.evaluate(kernel, leading)
+    outputs = numpy_kernels.evaluate(kernel, leading)
     ranks = {port.name: len(port.shape) for port in kernel.outputs}
     return {
-        key: np.moveaxis(a, range(-ranks[key], 0), range(ranks[key])) for key, a in found.items()
+        key: np.moveaxis(values, range(-ranks[key], 0), range(ranks[key]))
+        for key, values in outputs.items()
     }

@@ -1,4 +1,4 @@
-"""How a scene holds a beam and what it loads it with: what frames and bases are chosen from."""
+"""Boundary conditions and loads of a beam in its scene, for the choice of frames and bases."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mstmm.scene.validators.scalars_and_vectors import split_reference
 
 from .beam_data import BeamData
 from .restraint import restrained_beams
-from .static_shapes import stiffness_of
+from .static_shapes import direction_stiffness
 
 if TYPE_CHECKING:
     from mstmm.scene import Chain, Scene
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
 
     _Acting = Chain | Spring | Bushing | Load
 
-#: Deflection along y turns the section about z, along z about y, and twist turns it about x.
+#: Axis of the rotation of a section by direction: bending along y rotates it about z.
 AXES = {"y": (0.0, 0.0, 1.0), "z": (0.0, 1.0, 0.0), "twist": (1.0, 0.0, 0.0)}
-#: So much of an axis must lie among the free ones for a hinge to leave the rotation free.
+#: Least component along the free axes of a hinge for which a rotation counts as free.
 MOSTLY = 0.7
-#: A mass beyond an end is heavy from this share of the beam's mass on, a rotor at the held end from
-#: this share of the beam's inertia about it, a spring from this share of the beam's own stiffness.
+#: Share of the beam's mass, inertia or stiffness above which a body outboard of an end, a rotor at
+#: the inboard end or a spring counts as heavy or stiff.
 HEAVY = 0.1
 
-#: What a force at a section loads besides bending, which needs no static shapes for it.
+#: Direction that a force at a section loads besides bending.
 _ALONG = ("axial",)
 
 Vector = tuple[float, float, float]
@@ -42,8 +42,11 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class End:
-    """What acts at one section: directions that are loaded so that they need static shapes (by
-    moments, and axially by forces), and whether a heavy load does."""
+    """Loads at one section of a beam.
+
+    `moments` are the directions that need static shapes: loaded by moments, or axially by forces;
+    `heavy` says whether a heavy body or stiff element acts there.
+    """
 
     x: float
     moments: frozenset[str] = frozenset()
@@ -52,26 +55,29 @@ class End:
 
 @dataclass(frozen=True)
 class BoundaryConditions:
-    """How a beam is held: at `x` by a hinge that leaves `turns` (directions) free and translations
-    if `moves`; among them heavy rotors resist in some, springs or motors act in `sprung` ones."""
+    """Inboard hinge of a beam at `x` (m), and the loads on its ends.
 
-    name: str  #: end by which it is held
+    The hinge leaves the rotations `turns` (directions) free, and translations if `moves`.  Heavy
+    rotors resist the rotations `heavy_rotor`; springs or motors act in those of `sprung`.
+    """
+
+    name: str  #: inboard end
     x: float
     turns: frozenset[str]
     moves: bool
     heavy_rotor: frozenset[str] = frozenset()
     sprung: frozenset[str] = frozenset()
     ends: tuple[End, ...] = ()
-    said: str = ""  #: the hinge in words
-    restrained: bool = False  #: the rest of the scene holds its length
+    said: str = ""  #: description of the hinge, for messages
+    restrained: bool = False  #: the rest of the scene constrains its length
 
 
 class BeamEnvironment:
-    """What acts on which body of a scene, found once for all its beams."""
+    """Hinges, loads and outboard masses by body of a scene, computed once for all its beams."""
 
     def __init__(self, scene: Scene) -> None:
         self.holds = inboard_hinges_by_body(scene)
-        #: Hinges that close loops, by the bodies that others hold.
+        #: Cut hinges by outboard body, whose inboard hinge is another one.
         self.closes: dict[str, list[Hinge]] = {}
         for hinge in scene.hinge:
             if self.holds.get(hinge.outboard_body) is not hinge:
@@ -82,37 +88,38 @@ class BeamEnvironment:
         self.acts: dict[str, list[tuple[str, _Acting]]] = {}
         acting: list[_Acting] = [*scene.chain, *scene.forces, *scene.load]
         for element in acting:
-            for reference in _references(element):
+            for reference in _acted_ends(element):
                 name, end = split_reference(reference)
                 self.acts.setdefault(name, []).append((end or "root", element))
         self._masses = {b.name: b.mass if b.type == "rigid" else np.inf for b in scene.body}
         self._masses |= {b.name: b.mass for b in scene.beam}
-        for name in _tied(scene, self.closes):
+        for name in _coupled_bodies(scene, self.closes):
             self._masses[name] = np.inf
         self.restrained = restrained_beams(scene)
-        self._beyond: dict[str, float] = {}
+        self._outboard_masses: dict[str, float] = {}
 
     def mass_beyond(self, body: str) -> float:
-        """Mass of a body and of all that hangs on it; infinite where that is not known."""
-        waiting = [body]
-        while waiting:
-            name = waiting[-1]
+        """Mass (kg) of a body and of all bodies outboard of it; infinite if not known."""
+        pending = [body]
+        while pending:
+            name = pending[-1]
             children = [
                 hinge.outboard_body for hinge in self.carries.get(name, ())
                 if self.holds.get(hinge.outboard_body) is hinge
             ]  # fmt: skip
-            missing = [child for child in children if child not in self._beyond]
+            missing = [child for child in children if child not in self._outboard_masses]
             if missing:
-                waiting += missing
+                pending += missing
                 continue
-            waiting.pop()
+            pending.pop()
             own = self._masses.get(name, np.inf)
-            self._beyond[name] = own + sum(self._beyond[child] for child in children)
-        return self._beyond[body]
+            outboard = sum(self._outboard_masses[child] for child in children)
+            self._outboard_masses[name] = own + outboard
+        return self._outboard_masses[body]
 
 
-def _tied(scene: Scene, closes: Mapping[str, list[Hinge]]) -> Iterator[str]:
-    """Bodies that carry what their mass does not tell: loops, chains, springs and constraints."""
+def _coupled_bodies(scene: Scene, closes: Mapping[str, list[Hinge]]) -> Iterator[str]:
+    """Bodies whose loads exceed those of their outboard mass, as in loops and chains."""
     for body, hinges in closes.items():
         yield from (body, *(hinge.inboard_body for hinge in hinges))
     yield from (split_reference(chain.inboard)[0] for chain in scene.chain)
@@ -120,8 +127,8 @@ def _tied(scene: Scene, closes: Mapping[str, list[Hinge]]) -> Iterator[str]:
         yield from (split_reference(element.from_)[0], split_reference(element.to)[0])
 
 
-def _references(element: _Acting) -> tuple[str, ...]:
-    """The bodies and ends that an element acts on."""
+def _acted_ends(element: _Acting) -> tuple[str, ...]:
+    """References of the bodies and ends that an element acts on."""
     if isinstance(element, Load):
         return (element.on,)
     if isinstance(element, (Spring, Bushing)):
@@ -129,102 +136,110 @@ def _references(element: _Acting) -> tuple[str, ...]:
     return (element.inboard,)
 
 
-def holding(around: BeamEnvironment, beam: Beam, data: BeamData) -> BoundaryConditions:
-    """Read from the hinges, springs and loads of the scene; every beam is held by one hinge."""
-    ends = tuple(sorted(set(_ends(around, beam, data)), key=lambda end: end.x))
-    hinge = around.holds[beam.name]
-    at = hinge.outboard_end or "root"
-    x, turn = data.ends[at]
-    free = _directions(turn, free_axes(hinge))
-    stiff, rotors = _resisted(hinge, data)
+def boundary_conditions(
+    environment: BeamEnvironment, beam: Beam, data: BeamData
+) -> BoundaryConditions:
+    """Boundary conditions of a beam, from the hinges, springs and loads of the scene."""
+    ends = tuple(sorted(set(_ends(environment, beam, data)), key=lambda end: end.x))
+    hinge = environment.holds[beam.name]
+    name = hinge.outboard_end or "root"
+    x, rotation = data.ends[name]
+    free = _free_directions(rotation, free_axes(hinge))
+    is_sprung, has_heavy_rotor = _has_stiff_spring_or_rotor(hinge, data)
     return BoundaryConditions(
-        at,
+        name,
         x,
         free,
         hinge.facts is not None and hinge.facts.goes_anywhere,
-        heavy_rotor=free if rotors else frozenset(),
-        sprung=free if stiff or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
+        heavy_rotor=free if has_heavy_rotor else frozenset(),
+        sprung=free if is_sprung or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
         ends=ends,
         said=f"the {hinge.type} hinge",
-        restrained=beam.name in around.restrained,
+        restrained=beam.name in environment.restrained,
     )
 
 
-def _directions(turn: Array, axes: tuple[Vector, ...]) -> frozenset[str]:
-    """The directions whose rotation lies among free axes given in the axes of the end."""
+def _free_directions(rotation: Array, axes: tuple[Vector, ...]) -> frozenset[str]:
+    """Directions of a beam whose rotation is free, for free axes in the axes of the end."""
     if not axes:
         return frozenset()
-    span, values, _ = np.linalg.svd(turn @ np.array(axes).T, full_matrices=False)
-    span = span[:, values > 1e-9]
+    basis, values, _ = np.linalg.svd(rotation @ np.array(axes).T, full_matrices=False)
+    basis = basis[:, values > 1e-9]
     return frozenset(
-        word for word, axis in AXES.items() if np.linalg.norm(span.T @ np.array(axis)) > MOSTLY
+        direction
+        for direction, axis in AXES.items()
+        if np.linalg.norm(basis.T @ np.array(axis)) > MOSTLY
     )
 
 
-def _softest(data: BeamData) -> float:
-    """The least bending stiffness of the two planes, N m^2."""
-    return float(min(stiffness_of(data, "y").min(), stiffness_of(data, "z").min()))
+def _lowest_bending_stiffness(data: BeamData) -> float:
+    """Lowest bending stiffness of both planes, N m^2."""
+    return float(min(direction_stiffness(data, "y").min(), direction_stiffness(data, "z").min()))
 
 
-def _resisted(hinge: Hinge, data: BeamData) -> tuple[bool, bool]:
-    """(springs, rotors) that matter beside the beam's own stiffness and inertia."""
-    bending = _softest(data) / data.length
+def _has_stiff_spring_or_rotor(hinge: Hinge, data: BeamData) -> tuple[bool, bool]:
+    """Whether a spring, and whether a rotor of the hinge is significant for the beam."""
+    bending = _lowest_bending_stiffness(data) / data.length
     inertia = data.mass * data.length**2 / 3
-    stiffness, rotors = (_about_axes(hinge, key) for key in ("stiffness", "inertia"))
-    return stiffness > HEAVY * bending, rotors > HEAVY * inertia
+    stiffness, rotor_inertia = (
+        _largest_rotational_entry(hinge, key) for key in ("stiffness", "inertia")
+    )
+    return stiffness > HEAVY * bending, rotor_inertia > HEAVY * inertia
 
 
-def _about_axes(hinge: Hinge, key: str) -> float:
-    """The largest entry of a hinge's law among those of speeds that turn."""
+def _largest_rotational_entry(hinge: Hinge, key: str) -> float:
+    """Largest entry of a hinge law among its rotational speeds."""
     values = getattr(hinge.law, key)
     if len(values) > 1 and hinge.facts is not None:
         values = [values[k] for k in hinge.facts.turns]
     return float(max(values, default=0.0))
 
 
-# --- what acts at the other sections --------------------------------------------------------------
+# --- loads at the other sections ------------------------------------------------------------------
 
 
-def _ends(around: BeamEnvironment, beam: Beam, data: BeamData) -> Iterator[End]:
-    for hinge in around.carries.get(beam.name, ()):
-        x, turn = data.ends[hinge.inboard_end or "root"]
-        free = _directions(turn @ np.array(hinge.rotation), free_axes(hinge))
-        if any(hinge.law.stiffness) or any(hinge.law.inertia) or _acts(hinge):
+def _ends(environment: BeamEnvironment, beam: Beam, data: BeamData) -> Iterator[End]:
+    for hinge in environment.carries.get(beam.name, ()):
+        x, rotation = data.ends[hinge.inboard_end or "root"]
+        free = _free_directions(rotation @ np.array(hinge.rotation), free_axes(hinge))
+        if any(hinge.law.stiffness) or any(hinge.law.inertia) or _is_driven(hinge):
             free = frozenset()
-        closes = around.holds.get(hinge.outboard_body) is not hinge
-        heavy = closes or around.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
+        closes = environment.holds.get(hinge.outboard_body) is not hinge
+        heavy = closes or environment.mass_beyond(hinge.outboard_body) > HEAVY * data.mass
         yield End(x, frozenset(AXES) - free, heavy)
-    for hinge in around.closes.get(beam.name, ()):
-        x, turn = data.ends[hinge.outboard_end or "root"]
-        free = frozenset() if _acts(hinge) else _directions(turn, free_axes(hinge))
+    for hinge in environment.closes.get(beam.name, ()):
+        x, rotation = data.ends[hinge.outboard_end or "root"]
+        free = frozenset() if _is_driven(hinge) else _free_directions(rotation, free_axes(hinge))
         yield End(x, frozenset(AXES) - free, True)
-    for end, element in around.acts.get(beam.name, ()):
+    for end, element in environment.acts.get(beam.name, ()):
         x = data.ends[end][0]
         if isinstance(element, Load):
             if element.force_per_length is None:
-                turning = any(not m.is_zero for m in element.moment)
-                pulling = any(not f.is_zero for f in element.force)
-                yield End(x, frozenset([*(AXES if turning else ()), *_ALONG[:pulling]]))
+                has_moment = any(not m.is_zero for m in element.moment)
+                has_force = any(not f.is_zero for f in element.force)
+                yield End(x, frozenset([*(AXES if has_moment else ()), *_ALONG[:has_force]]))
         elif isinstance(element, Spring):
             yield End(x, frozenset(_ALONG), _is_stiff(element, data))
         elif isinstance(element, Bushing):
             along, about = element.stiffest
-            yield End(x, frozenset(AXES if about else ()), along > HEAVY * _own_stiffness(data))
+            yield End(
+                x, frozenset(AXES if about else ()), along > HEAVY * _cantilever_stiffness(data)
+            )
         else:
             yield End(x, frozenset(AXES), True)
 
 
 def _is_stiff(spring: Spring, data: BeamData) -> bool:
-    """Stiff beside the beam as a cantilever, or of a user's type."""
-    return spring.type != "spring" or spring.law.stiffness > HEAVY * _own_stiffness(data)
+    """Whether a spring is stiff against the beam as a cantilever, or of a user-defined type."""
+    return spring.type != "spring" or spring.law.stiffness > HEAVY * _cantilever_stiffness(data)
 
 
-def _own_stiffness(data: BeamData) -> float:
-    """Of the tip of the beam as a cantilever, N/m."""
-    return 3 * _softest(data) / data.length**3
+def _cantilever_stiffness(data: BeamData) -> float:
+    """Stiffness of the tip of the beam as a cantilever, N/m."""
+    return 3 * _lowest_bending_stiffness(data) / data.length**3
 
 
-def _acts(hinge: Hinge) -> bool:
-    """A drive or an effort: a moment whatever the beam does."""
-    driven = hinge.drive is not None and any(d is not None for d in hinge.drive)
-    return driven or any(not e.is_zero for e in hinge.law.effort)
+def _is_driven(hinge: Hinge) -> bool:
+    """Whether a hinge has a drive or an effort, which act whatever the motion of the beam."""
+    is_driven = hinge.drive is not None and any(d is not None for d in hinge.drive)
+    return is_driven or any(not e.is_zero for e in hinge.law.effort)

@@ -1,4 +1,4 @@
-"""Where the floating frame of a beam is, for one direction."""
+"""Location of the floating frame of a beam, in one direction."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Frame:
-    """Where the floating frame of one direction is: "tangent" at `x` (m), "chord" or "mean"."""
+    """Location of the floating frame in one direction: "tangent" at `x` (m), "chord" or "mean"."""
 
     kind: str
     x: float = 0.0
 
     @property
     def origin(self) -> float | None:
-        """Section that does not move along the beam or about it, None for the mean."""
+        """Section (m) without axial displacement and twist; None for the mean frame."""
         return {"tangent": self.x, "chord": 0.0, "mean": None}[self.kind]

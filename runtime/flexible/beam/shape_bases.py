@@ -1,9 +1,10 @@
-"""Shape bases of a beam: which functions of x stand for its deformation in one direction.
+"""Shape bases of a beam: assumed deformations in one direction as functions of x.
 
 clamped-free, free-free and simply-supported are the eigenfunctions of those beams; a beam clamped
 at an inner section has those of both parts, each zero on the other.  Static and fixed-interface
 shapes (Craig and Bampton, AIAA J. 6, 1968) are the deflections under unit displacements of the
-interfaces, and the eigenfunctions with all interfaces clamped: they carry any load at them.
+interfaces, and the eigenfunctions with all interfaces clamped; they represent any load on the
+interfaces.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from .expression_shapes import ExpressionShape
 from .shape_functions import Eigenfunction, Shape, Sine
 from .static_shapes import (
     bending_eigenfunctions,
-    bending_statics,
-    end_slope,
+    bending_static_shapes,
+    end_slope_shape,
     rod_eigenfunctions,
-    rod_statics,
+    rod_static_shapes,
 )
 
 CLAMPED_FREE, FREE_FREE = "clamped-free", "free-free"
@@ -29,10 +30,10 @@ SIMPLY_SUPPORTED, STATIC, GIVEN = "simply-supported", "static+fixed-interface", 
 
 @dataclass(frozen=True)
 class Basis:
-    """A choice of shapes in one direction.
+    """Shape basis in one direction.
 
-    `base` (m) is the section that clamped shapes hold, `others` the further interfaces of static
-    shapes; simply supported shapes get a static shape with unit end slope at each of `slopes`.
+    `base` (m) is the clamped section, `others` (m) are further interfaces of static shapes.
+    Simply supported shapes get a static shape with unit end slope at each of `slopes` (m).
     """
 
     kind: str
@@ -43,48 +44,49 @@ class Basis:
 
 
 def static_count(basis: Basis, direction: str) -> int:
-    """How many of the shapes are static ones."""
+    """Number of static shapes of a basis."""
     per_interface = 2 if direction in ("y", "z") else 1
     if basis.kind == STATIC:
         return per_interface * len(basis.others)
     return len(basis.slopes) if direction in ("y", "z") else 0
 
 
-def shapes_of(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
-    """`count` shapes; of a beam clamped at an inner section `count` for each part."""
+def basis_shapes(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
+    """Shapes of a basis; `count` for each part of a beam that is clamped at an inner section."""
     if basis.kind == GIVEN:
         return list(basis.given)
     bends = direction in ("y", "z")
     if basis.kind == STATIC:
-        statics = (bending_statics if bends else rod_statics)(
+        statics = (bending_static_shapes if bends else rod_static_shapes)(
             data, direction, basis.base, basis.others
         )
-        held = sorted({basis.base, *basis.others})
-        rest = count - len(statics)
-        fixed = _fixed_interface(data, direction, held, rest) if rest > 0 else []
-        return [*statics[:count], *fixed]
-    return (_bending if bends else _rod)(data, direction, basis, count)
+        interfaces = sorted({basis.base, *basis.others})
+        fixed_count = count - len(statics)
+        if fixed_count <= 0:
+            return list(statics[:count])
+        return [*statics, *_fixed_interface_shapes(data, direction, interfaces, fixed_count)]
+    return (_bending_shapes if bends else _rod_shapes)(data, direction, basis, count)
 
 
-def _bending(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
+def _bending_shapes(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
     length = data.length
     if basis.kind == CLAMPED_FREE:
-        return _parts(data, direction, basis.base, count)
+        return _clamped_free_shapes(data, direction, basis.base, count)
     if basis.kind == FREE_FREE:
         if data.uniform:
             return [Eigenfunction(FREE_FREE, k, 0.0, length) for k in range(1, count + 1)]
         return list(bending_eigenfunctions(data, direction, count, skip=2))
-    slopes = [end_slope(data, direction, x) for x in basis.slopes][:count]
-    rest = count - len(slopes)
+    slopes = [end_slope_shape(data, direction, x) for x in basis.slopes][:count]
+    sine_count = count - len(slopes)
     if data.uniform:
-        sines = [Eigenfunction(SIMPLY_SUPPORTED, k, 0.0, length) for k in range(1, rest + 1)]
+        sines = [Eigenfunction(SIMPLY_SUPPORTED, k, 0.0, length) for k in range(1, sine_count + 1)]
         return [*slopes, *sines]
     supports = (0.0, length)
-    return [*slopes, *bending_eigenfunctions(data, direction, rest, supported=supports)]
+    return [*slopes, *bending_eigenfunctions(data, direction, sine_count, supported=supports)]
 
 
-def _parts(data: BeamData, direction: str, base: float, count: int) -> list[Shape]:
-    """Clamped-free shapes of what lies on either side of the clamp, root side first."""
+def _clamped_free_shapes(data: BeamData, direction: str, base: float, count: int) -> list[Shape]:
+    """Clamped-free shapes of the parts on both sides of the clamp, root side first."""
     length = data.length
     if data.uniform:
         shapes: list[Shape] = []
@@ -99,7 +101,7 @@ def _parts(data: BeamData, direction: str, base: float, count: int) -> list[Shap
     return list(bending_eigenfunctions(data, direction, sides * count, clamped=[base]))
 
 
-def _rod(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
+def _rod_shapes(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape]:
     length = data.length
     if basis.kind == FREE_FREE:
         if data.uniform:
@@ -119,31 +121,33 @@ def _rod(data: BeamData, direction: str, basis: Basis, count: int) -> list[Shape
     return shapes
 
 
-def _fixed_interface(
-    data: BeamData, direction: str, held: Sequence[float], count: int
+def _fixed_interface_shapes(
+    data: BeamData, direction: str, interfaces: Sequence[float], count: int
 ) -> list[Shape]:
-    """The `count` lowest eigenfunctions with all interfaces held."""
+    """The `count` lowest eigenfunctions with all interfaces fixed."""
     bends = direction in ("y", "z")
     if not data.uniform:
         if bends:
-            return list(bending_eigenfunctions(data, direction, count, clamped=held))
-        return list(rod_eigenfunctions(data, direction, count, fixed=held))
-    found: list[tuple[float, int, Shape]] = []
-    places = [0.0, *held, data.length]
+            return list(bending_eigenfunctions(data, direction, count, clamped=interfaces))
+        return list(rod_eigenfunctions(data, direction, count, fixed=interfaces))
+    candidates: list[tuple[float, int, Shape]] = []
+    places = [0.0, *interfaces, data.length]
     for i, (start, end) in enumerate(itertools.pairwise(places)):
         if end <= start:
             continue
-        left, right = i > 0, i < len(places) - 2
+        left_fixed, right_fixed = i > 0, i < len(places) - 2
         for k in range(1, count + 1):
-            shape = _span(bends, k, start, end, left, right)
-            found.append((shape.beta / (end - start), i, shape))
-    return [shape for _, _, shape in sorted(found, key=lambda one: one[:2])[:count]]
+            shape = _span_shape(bends, k, start, end, left_fixed, right_fixed)
+            candidates.append((shape.beta / (end - start), i, shape))
+    candidates.sort(key=lambda candidate: candidate[:2])
+    return [shape for _, _, shape in candidates[:count]]
 
 
-def _span(
-    bends: bool, k: int, start: float, end: float, left: bool, right: bool
+def _span_shape(
+    bends: bool, k: int, start: float, end: float, left_fixed: bool, right_fixed: bool
 ) -> Eigenfunction | Sine:
-    """Shape k of a span held at its left end, its right end or both."""
+    """Shape k of a span fixed at its left end, its right end or both."""
     kinds = ("clamped-clamped", CLAMPED_FREE) if bends else ("fixed-fixed", "fixed-free")
-    make = Eigenfunction if bends else Sine
-    return make(kinds[0 if left and right else 1], k, start, end, not left, not right)
+    shape_type = Eigenfunction if bends else Sine
+    kind = kinds[0 if left_fixed and right_fixed else 1]
+    return shape_type(kind, k, start, end, not left_fixed, not right_fixed)

@@ -1,4 +1,4 @@
-"""The shapes of one beam together: what they are at any section, to first order."""
+"""All shapes of one beam: first-order displacements and rotations at any section."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from mstmm.array_validation import Array
 
 from . import beam_kernels
 from .beam_data import BeamData, BeamSections
-from .gauss_quadrature import density_of, gauss_between
+from .gauss_quadrature import gauss_between, shape_density
 from .shape_functions import Shape
 
 #: Directions in the order of the modal coordinates.
@@ -21,10 +21,10 @@ ROW = {"axial": 0, "y": 1, "z": 2, "twist": 3}
 
 @dataclass(frozen=True)
 class Mode:
-    """One modal coordinate: what it moves and by which shape.
+    """One modal coordinate: direction and shape.
 
-    `turned` is the rotation (rad) per unit by which the frame's choice turned the whole shape
-    back: sections turn by it with their inertia even where rotary inertia is left out.
+    `turned` is the rigid rotation (rad) per unit that the frame conditions removed from the shape.
+    The inertia of the sections rotates by it even where rotary inertia is neglected.
     """
 
     name: str
@@ -54,8 +54,8 @@ class ShapeFields:
         smallest = 1e-12 * data.length
         self.pieces = tuple(
             b for a, b in zip((-data.length, *places), places, strict=False) if b - a > smallest
-        )  #: every place between which all shapes and sections are smooth
-        self.density = density_of([mode.shape for mode in modes])
+        )  #: positions between which all shapes and sections are smooth
+        self.density = shape_density([mode.shape for mode in modes])
 
     @property
     def n(self) -> int:
@@ -68,51 +68,50 @@ class ShapeFields:
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Where the section changes, 0 and the length included (m)."""
+        """Positions (m) of section changes, with 0 and the length."""
         return self.data.breaks
 
     @property
     def rotary(self) -> bool:
-        """True when the sections' rotary inertia takes part in bending."""
+        """Whether bending includes rotary inertia."""
         return self.data.rotary
 
     def sections(self, x: Array) -> BeamSections:
-        """Section data at every x."""
+        """Section data at every x (m)."""
         return self.data.sections(np.asarray(x, dtype=float))
 
     def rule(self) -> tuple[Array, Array]:
-        """Places and weights (m) of a quadrature along the beam that integrates products of shapes
-        to rounding."""
+        """Quadrature points and weights (m) along the beam, exact for products of two shapes."""
         return gauss_between(self.pieces, self.density)
 
     def rows(self, x: Array, d: int) -> Array:
-        """Derivative number d of s, v, w, psi per mode: (4, n, m)."""
+        """Derivatives (4, n, m) of order d of s, v, w, psi per mode."""
         values = np.zeros((4, self.n, len(x)))
         for k, mode in enumerate(self.modes):
             values[ROW[mode.direction], k] = mode.shape(x, d)
         return values
 
     def carried(self, slopes: Array, twist: Array) -> Array:
-        """Rotation of the sections' inertia per mode, (3, n, m), from d(s, v, w, psi)/dx."""
-        turn = np.zeros((3, *twist.shape))
-        turn[0] = twist
+        """Rotation (3, n, m) of the inertia of sections per mode, from d(s, v, w, psi)/dx."""
+        rotation = np.zeros((3, *twist.shape))
+        rotation[0] = twist
         if self.data.rotary:
-            turn[1], turn[2] = -slopes[2], slopes[1]
-            return turn
+            rotation[1], rotation[2] = -slopes[2], slopes[1]
+            return rotation
         for k, mode in enumerate(self.modes):
             if mode.direction in ("y", "z"):
-                turn[2 if mode.direction == "y" else 1, k] = mode.turned
-        return turn
+                rotation[2 if mode.direction == "y" else 1, k] = mode.turned
+        return rotation
 
     def at(self, x: Array) -> ShapeValues:
-        """Values at sections x (m,)."""
+        """Displacements and rotations per mode at sections x (m,)."""
         x = np.atleast_1d(np.asarray(x, dtype=float))
-        values, slopes, bends = (self.rows(x, d) for d in range(3))
-        here = beam_kernels.evaluate("section", {"values": values, "slopes": slopes[1:3]})
-        change = beam_kernels.evaluate("section", {"values": slopes, "slopes": bends[1:3]})
+        values, slopes, curvatures = (self.rows(x, d) for d in range(3))
+        fields = beam_kernels.evaluate("section", {"values": values, "slopes": slopes[1:3]})
+        rates = beam_kernels.evaluate("section", {"values": slopes, "slopes": curvatures[1:3]})
         return ShapeValues(
-            np.moveaxis(here["phi"], 2, 0),
-            np.moveaxis(here["theta"], 2, 0),
-            np.moveaxis(change["theta"], 2, 0),
+            np.moveaxis(fields["phi"], 2, 0),
+            np.moveaxis(fields["theta"], 2, 0),
+            np.moveaxis(rates["theta"], 2, 0),
             slopes[0].T.copy(),
         )

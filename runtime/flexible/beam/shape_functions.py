@@ -1,13 +1,13 @@
-"""Shapes along a beam: functions of x with their derivatives, stable for any number of half-waves.
+"""Shape functions along a beam with derivatives, accurate for any number of half-waves.
 
 The eigenfunctions of the uniform beam are sums of cos, sin, cosh and sinh of beta x/l.  The growing
-exponential of cosh and sinh cancels but for a remainder that the end conditions fix, so it is
-written as one that decays from the far end:
+exponentials of cosh and sinh cancel up to a remainder given by the boundary conditions, which is
+written as an exponential that decays from the far end:
 
     phi = g e^(-beta (1 - xi)) + (1 + sigma)/2 e^(-beta xi) + s (cos(beta xi) - sigma sin(beta xi))
 
 with xi = x/l.  From cosh - sigma sinh = (1 - sigma)/2 e^(beta xi) + (1 + sigma)/2 e^(-beta xi)
-follows g = (1 - sigma)/2 e^beta, which is formed from sigma's quotient without the difference.
+follows g = (1 - sigma)/2 e^beta, which is computed from the quotient of sigma without cancellation.
 Each is scaled to int phi^2 dxi = 1.  Euler-Bernoulli theory, e.g. Rao, Vibration of Continuous
 Systems, ch. 11.
 """
@@ -28,18 +28,18 @@ _SQRT2 = math.sqrt(2.0)
 
 
 class Shape(Protocol):
-    """A function of x on 0 <= x <= length and its derivatives by x."""
+    """Function of x on 0 <= x <= length, with its derivatives."""
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """Places (m) between which the function is smooth, its own ends included."""
+        """Positions (m) between which the function is smooth, with both ends of its support."""
 
     @property
     def density(self) -> float:
-        """Half-waves per metre between breaks, 0 for a low polynomial: how many Gauss points."""
+        """Half-waves per metre, 0 for a low polynomial; sets the number of Gauss points."""
 
     def __call__(self, x: Array, d: int = 0) -> Array:
-        """Derivative number `d` (0 to 4) at every x (m)."""
+        """Derivative of order `d` (0 to 4) at every x (m)."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,12 @@ class _Constants:
 
 
 @lru_cache(maxsize=4096)
-def root(kind: str, number: int) -> float:
-    """beta: root of cos b = -sech b ("clamped-free") or cos b = +sech b ("free-free",
-    "clamped-clamped"), by Newton's method on the equation without growing terms."""
+def wave_number(kind: str, number: int) -> float:
+    """Dimensionless wave number beta of an eigenfunction of the uniform beam.
+
+    Root of cos b = -sech b ("clamped-free") or cos b = +sech b ("free-free", "clamped-clamped"),
+    by Newton's method on the equation without growing terms.
+    """
     sign = 1.0 if kind == "clamped-free" else -1.0
     b = (number - 0.5 if kind == "clamped-free" else number + 0.5) * math.pi
     for _ in range(60):
@@ -68,27 +71,27 @@ def root(kind: str, number: int) -> float:
 
 @lru_cache(maxsize=4096)
 def _constants(kind: str, number: int) -> _Constants:
-    b = root(kind, number)
+    b = wave_number(kind, number)
     e, c, s = math.exp(-b), math.cos(b), math.sin(b)
     if kind == "clamped-free":
-        below = 1.0 - e * e + 2.0 * e * s
-        return _Constants(b, (1.0 + e * e + 2.0 * e * c) / below, (s - c - e) / below, -1.0)
-    below = 1.0 - e * e - 2.0 * e * s
+        divisor = 1.0 - e * e + 2.0 * e * s
+        return _Constants(b, (1.0 + e * e + 2.0 * e * c) / divisor, (s - c - e) / divisor, -1.0)
+    divisor = 1.0 - e * e - 2.0 * e * s
     return _Constants(
         b,
-        (1.0 + e * e - 2.0 * e * c) / below,
-        (c - s - e) / below,
+        (1.0 + e * e - 2.0 * e * c) / divisor,
+        (c - s - e) / divisor,
         1.0 if kind == "free-free" else -1.0,
     )
 
 
-#: sin(k pi/2) and cos(k pi/2).
-_QUARTER = (0.0, 1.0, 0.0, -1.0)
+#: sin(k pi/2) by k modulo 4; cos(k pi/2) is the next entry.
+_QUARTER_SINE = (0.0, 1.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True)
 class Eigenfunction:
-    """Bending shape number `number` of a uniform beam on start <= x <= end (m), zero outside.
+    """Bending eigenfunction of a uniform beam on start <= x <= end (m), zero outside.
 
     `kind` is "clamped-free" (clamped at `start`, or at `end` if `mirrored`), "free-free",
     "clamped-clamped" or "simply-supported".
@@ -99,7 +102,7 @@ class Eigenfunction:
     start: float
     end: float
     mirrored: bool = False
-    closed: bool = True  #: its last section counts as inside
+    closed: bool = True  #: whether `end` belongs to the span
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -114,13 +117,13 @@ class Eigenfunction:
         """Wave number times the length of the span."""
         if self.kind == "simply-supported":
             return self.number * math.pi
-        return root(self.kind, self.number)
+        return wave_number(self.kind, self.number)
 
     def __call__(self, x: Array, d: int = 0) -> Array:
         span = self.end - self.start
         xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
         scale = (-1.0 if self.mirrored and d % 2 else 1.0) / span**d
-        inside = _inside(x, self.start, self.end, self.closed)
+        inside = _is_inside(x, self.start, self.end, self.closed)
         return np.where(inside, scale * self._unit(np.clip(xi, 0.0, 1.0), d), 0.0)
 
     def _unit(self, xi: Array, d: int) -> Array:
@@ -134,18 +137,18 @@ class Eigenfunction:
 
 
 def _wave(angle: Array, d: int, cosine: float, sine: float) -> Array:
-    """Derivative number d of cosine cos(angle) + sine sin(angle) by the angle."""
-    c, s = _QUARTER[(d + 1) % 4], _QUARTER[d % 4]
+    """Derivative of order d of cosine cos(angle) + sine sin(angle)."""
+    c, s = _QUARTER_SINE[(d + 1) % 4], _QUARTER_SINE[d % 4]
     return (cosine * c + sine * s) * np.cos(angle) + (sine * c - cosine * s) * np.sin(angle)
 
 
-def _inside(x: Array, start: float, end: float, closed: bool) -> NDArray[np.bool_]:
+def _is_inside(x: Array, start: float, end: float, closed: bool) -> NDArray[np.bool_]:
     return (x >= start) & ((x <= end) if closed else (x < end))
 
 
 @dataclass(frozen=True)
 class Sine:
-    """sqrt2 sin or sqrt2 cos of a rod in twist or in tension on start <= x <= end, zero outside.
+    """Eigenfunction of a uniform rod on start <= x <= end (m): sqrt2 sin or cos, zero outside.
 
     `kind`: "fixed-free" sin((k - 1/2) pi xi) (fixed at `end` if `mirrored`), "free-free"
     cos(k pi xi), "fixed-fixed" sin(k pi xi).
@@ -156,7 +159,7 @@ class Sine:
     start: float
     end: float
     mirrored: bool = False
-    closed: bool = True  #: its last section counts as inside
+    closed: bool = True  #: whether `end` belongs to the span
 
     @property
     def breaks(self) -> tuple[float, ...]:
@@ -176,12 +179,12 @@ class Sine:
         xi = ((self.end - x) if self.mirrored else (x - self.start)) / span
         scale = (-1.0 if self.mirrored and d % 2 else 1.0) * _SQRT2 * (self.beta / span) ** d
         wave = (1.0, 0.0) if self.kind == "free-free" else (0.0, 1.0)
-        inside = _inside(x, self.start, self.end, self.closed)
+        inside = _is_inside(x, self.start, self.end, self.closed)
         return np.where(inside, scale * _wave(self.beta * np.clip(xi, 0.0, 1.0), d, *wave), 0.0)
 
 
 class Piecewise:
-    """Polynomials between nodes: `coefficients[i, j]` of (x - nodes[i])^j on piece i."""
+    """Piecewise polynomial: `coefficients[i, j]` of (x - nodes[i])^j between nodes i and i + 1."""
 
     density = 0.0
 
@@ -203,7 +206,7 @@ class Piecewise:
 
 
 class ShiftedShape:
-    """A shape less a rigid part: shape(x) - a - b x, which puts the floating frame elsewhere."""
+    """Shape less a rigid part, shape(x) - a - b x, for another floating frame."""
 
     def __init__(self, shape: Shape, a: float, b: float) -> None:
         self.shape, self.a, self.b = shape, a, b

@@ -1,8 +1,8 @@
-"""Shapes of a beam with given sections by cubic elements: static ones, and those of stepped beams.
+"""Static shapes of a beam, and eigenfunctions of a stepped beam, by finite elements.
 
-Cubic elements are exact for beams that are loaded at their nodes only, so that the static shapes
-are exact for sections constant between nodes.  Eigenfunctions of a stepped beam are found on a fine
-division; they are a basis, and every integral over them is taken exactly of what they are.
+Cubic elements are exact for beams loaded at nodes only, so that the static shapes are exact for
+sections that are constant between nodes.  Eigenfunctions of a stepped beam are computed with a fine
+mesh.  As a basis they need no exact values: integrals over the piecewise polynomials are exact.
 """
 
 from __future__ import annotations
@@ -20,46 +20,46 @@ from .shape_functions import Piecewise
 #: Row of `BeamData.stiffness` per direction.
 _STIFFNESS = {"axial": 0, "twist": 1, "z": 2, "y": 3}
 #: Elements per half-wave of the highest shape of a stepped beam.
-_PER_WAVE = 8
+_ELEMENTS_PER_HALF_WAVE = 8
 
 
-def stiffness_of(data: BeamData, direction: str) -> Array:
-    """EA, GI_t or EI of every piece in one direction."""
+def direction_stiffness(data: BeamData, direction: str) -> Array:
+    """Stiffness EA, GI_t or EI of every piece in one direction."""
     return data.stiffness[_STIFFNESS[direction]]
 
 
 # --- bending --------------------------------------------------------------------------------------
 
 
-def bending_statics(
+def bending_static_shapes(
     data: BeamData, direction: str, base: float, others: Sequence[float]
 ) -> list[Piecewise]:
-    """Unit deflection, then unit rotation times the length, of every other interface in turn.
+    """Static bending shapes: unit deflection, then unit rotation times length, of each interface.
 
-    All interfaces (x in m) are otherwise held in place and direction; so is `base`.
+    All other interfaces (x in m) are clamped, as is `base`.
     """
     nodes = np.array(sorted({*data.breaks, base, *others}))
-    held = [node_at(nodes, x) for x in (base, *others)]
-    fixed = [dof for i in held for dof in (2 * i, 2 * i + 1)]
+    interface_nodes = [nearest_node(nodes, x) for x in (base, *others)]
+    fixed = [dof for i in interface_nodes for dof in (2 * i, 2 * i + 1)]
     k, _ = bending_matrices(data, direction, nodes)
     return [
-        _cubic(nodes, _displaced(k, fixed, dof, size))
-        for i in held[1:]
+        _cubic(nodes, _static_displacement(k, fixed, dof, size))
+        for i in interface_nodes[1:]
         for dof, size in ((2 * i, 1.0), (2 * i + 1, 1.0 / data.length))
     ]
 
 
-def end_slope(data: BeamData, direction: str, x: float) -> Piecewise:
-    """Unit rotation times the length at the end x; both ends supported, the other free to turn."""
+def end_slope_shape(data: BeamData, direction: str, x: float) -> Piecewise:
+    """Static shape with unit slope times length at the end x (m) of a simply supported beam."""
     nodes = np.array(data.breaks)
-    turned = 2 * node_at(nodes, x) + 1
+    slope_dof = 2 * nearest_node(nodes, x) + 1
     k, _ = bending_matrices(data, direction, nodes)
-    fixed = [0, len(k) - 2, turned]
-    return _cubic(nodes, _displaced(k, fixed, turned, 1.0 / data.length))
+    fixed = [0, len(k) - 2, slope_dof]
+    return _cubic(nodes, _static_displacement(k, fixed, slope_dof, 1.0 / data.length))
 
 
-def _displaced(k: Array, fixed: list[int], dof: int, size: float) -> Array:
-    """Static displacements with one of the `fixed` coordinates at `size` and the others at zero."""
+def _static_displacement(k: Array, fixed: list[int], dof: int, size: float) -> Array:
+    """Static displacements with coordinate `dof` at `size` and the other `fixed` ones at zero."""
     u = np.zeros(len(k))
     u[dof] = size
     free = np.setdiff1d(np.arange(len(k)), fixed)
@@ -72,31 +72,33 @@ def bending_eigenfunctions(
     data: BeamData, direction: str, count: int, clamped: Iterable[float] = (),
     supported: Iterable[float] = (), skip: int = 0,
 ) -> list[Piecewise]:  # fmt: skip
-    """The first `count` eigenfunctions after `skip` of the stepped beam with sections clamped or
-    simply supported; scaled to a mean square of one."""
+    """First `count` bending eigenfunctions of a stepped beam after the first `skip`.
+
+    Sections (m) are `clamped` or simply `supported`; the mean square is scaled to one.
+    """
     clamped, supported = list(clamped), list(supported)
-    nodes = divided(data, count + skip, (*clamped, *supported))
+    nodes = element_nodes(data, count + skip, (*clamped, *supported))
     k, m = bending_matrices(data, direction, nodes)
-    fixed = [2 * node_at(nodes, x) for x in (*clamped, *supported)]
-    fixed += [2 * node_at(nodes, x) + 1 for x in clamped]
+    fixed = [2 * nearest_node(nodes, x) for x in (*clamped, *supported)]
+    fixed += [2 * nearest_node(nodes, x) + 1 for x in clamped]
     vectors = _eigenvectors(k, m, fixed, skip + count)[:, skip:]
-    return [_cubic(nodes, _scaled(nodes, u)) for u in vectors.T]
+    return [_cubic(nodes, _normalised(nodes, u)) for u in vectors.T]
 
 
 def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Array, Array]:
-    """Stiffness and mass of cubic elements; coordinates v, v' per node."""
+    """Stiffness and mass matrix of cubic elements; coordinates v, v' per node."""
     size = 2 * len(nodes)
     k, m = np.zeros((size, size)), np.zeros((size, size))
     middle = (nodes[1:] + nodes[:-1]) / 2
-    at = data.piece(middle)
-    bending, mass = stiffness_of(data, direction)[at], data.inertia[0][at]
+    pieces = data.piece(middle)
+    bending, mass = direction_stiffness(data, direction)[pieces], data.inertia[0][pieces]
     for i, h in enumerate(np.diff(nodes)):
-        cut = slice(2 * i, 2 * i + 4)
-        k[cut, cut] += bending[i] / h**3 * np.array(
+        dofs = slice(2 * i, 2 * i + 4)
+        k[dofs, dofs] += bending[i] / h**3 * np.array(
             [[12, 6 * h, -12, 6 * h], [6 * h, 4 * h * h, -6 * h, 2 * h * h],
              [-12, -6 * h, 12, -6 * h], [6 * h, 2 * h * h, -6 * h, 4 * h * h]]
         )  # fmt: skip
-        m[cut, cut] += mass[i] * h / 420 * np.array(
+        m[dofs, dofs] += mass[i] * h / 420 * np.array(
             [[156, 22 * h, 54, -13 * h], [22 * h, 4 * h * h, 13 * h, -3 * h * h],
              [54, 13 * h, 156, -22 * h], [-13 * h, -3 * h * h, -22 * h, 4 * h * h]]
         )  # fmt: skip
@@ -104,7 +106,7 @@ def bending_matrices(data: BeamData, direction: str, nodes: Array) -> tuple[Arra
 
 
 def _cubic(nodes: Array, u: Array) -> Piecewise:
-    """Cubics between nodes from v and v' at them."""
+    """Piecewise cubic with values v and slopes v' at the nodes."""
     h, v, s = np.diff(nodes), u[0::2], u[1::2]
     rise = (v[1:] - v[:-1]) / h
     return Piecewise(
@@ -124,22 +126,21 @@ def _cubic(nodes: Array, u: Array) -> Piecewise:
 # --- twist and tension ----------------------------------------------------------------------------
 
 
-def rod_statics(
+def rod_static_shapes(
     data: BeamData, direction: str, base: float, others: Sequence[float]
 ) -> list[Piecewise]:
-    """Unit twist or axial displacement of every other interface in turn, the rest held."""
+    """Static twist or axial shapes: unit displacement of each interface, the others fixed."""
     nodes = np.array(sorted({*data.breaks, base, *others}))
-    held = [node_at(nodes, x) for x in (base, *others)]
-    compliance = (
-        np.diff(nodes) / stiffness_of(data, direction)[data.piece((nodes[1:] + nodes[:-1]) / 2)]
-    )
-    along = np.concatenate([[0.0], np.cumsum(compliance)])  # straight in this coordinate
-    order = np.argsort(nodes[held])
-    places = along[np.array(held)[order]]
+    interface_nodes = [nearest_node(nodes, x) for x in (base, *others)]
+    stiffness = direction_stiffness(data, direction)[data.piece((nodes[1:] + nodes[:-1]) / 2)]
+    # The shapes are piecewise linear in the coordinate int dx / stiffness.
+    stretched_x = np.concatenate([[0.0], np.cumsum(np.diff(nodes) / stiffness)])
+    order = np.argsort(nodes[interface_nodes])
+    interface_x = stretched_x[np.array(interface_nodes)[order]]
     shapes = []
-    for i in held[1:]:
-        at_places = (np.array(held)[order] == i).astype(float)
-        values = np.interp(along, places, at_places)
+    for i in interface_nodes[1:]:
+        interface_values = (np.array(interface_nodes)[order] == i).astype(float)
+        values = np.interp(stretched_x, interface_x, interface_values)
         slopes = np.diff(values) / np.diff(nodes)
         shapes.append(Piecewise(nodes, np.stack([values[:-1], slopes], axis=1)))
     return shapes
@@ -148,27 +149,27 @@ def rod_statics(
 def rod_eigenfunctions(
     data: BeamData, direction: str, count: int, fixed: Iterable[float] = (), skip: int = 0
 ) -> list[Piecewise]:
-    """The first `count` eigenfunctions after `skip` of the stepped rod, by parabolic elements."""
+    """First `count` eigenfunctions of a stepped rod after the first `skip`."""
     fixed = list(fixed)
-    ends = divided(data, count + skip, fixed)
+    ends = element_nodes(data, count + skip, fixed)
     nodes, k, m = rod_matrices(data, direction, ends)
-    vectors = _eigenvectors(k, m, [node_at(nodes, x) for x in fixed], skip + count)[:, skip:]
-    return [_parabola(ends, _scaled(ends, u)) for u in vectors.T]
+    vectors = _eigenvectors(k, m, [nearest_node(nodes, x) for x in fixed], skip + count)[:, skip:]
+    return [_parabola(ends, _normalised(ends, u)) for u in vectors.T]
 
 
 def rod_matrices(data: BeamData, direction: str, ends: Array) -> tuple[Array, Array, Array]:
-    """Places of the unknowns, stiffness and mass of parabolic elements between `ends`."""
+    """Nodes (m), stiffness and mass matrix of quadratic elements between `ends` (m)."""
     nodes = np.empty(2 * len(ends) - 1)
     nodes[0::2], nodes[1::2] = ends, (ends[1:] + ends[:-1]) / 2
-    at = data.piece(nodes[1::2])
+    pieces = data.piece(nodes[1::2])
     mass = data.inertia[0] if direction == "axial" else data.inertia[1] + data.inertia[2]
     k, m = np.zeros((len(nodes), len(nodes))), np.zeros((len(nodes), len(nodes)))
     for i, h in enumerate(np.diff(ends)):
-        cut = slice(2 * i, 2 * i + 3)
-        k[cut, cut] += stiffness_of(data, direction)[at[i]] / (3 * h) * np.array(
+        dofs = slice(2 * i, 2 * i + 3)
+        k[dofs, dofs] += direction_stiffness(data, direction)[pieces[i]] / (3 * h) * np.array(
             [[7, -8, 1], [-8, 16, -8], [1, -8, 7]]
         )  # fmt: skip
-        m[cut, cut] += mass[at[i]] * h / 30 * np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]])
+        m[dofs, dofs] += mass[pieces[i]] * h / 30 * np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]])
     return nodes, k, m
 
 
@@ -179,27 +180,27 @@ def _parabola(ends: Array, u: Array) -> Piecewise:
     )
 
 
-# --- what both need -------------------------------------------------------------------------------
+# --- shared functions -----------------------------------------------------------------------------
 
 
-def divided(data: BeamData, count: int, places: Iterable[float]) -> Array:
-    """Nodes at all breaks and `places`, fine enough for `count` half-waves."""
-    longest = data.length / (_PER_WAVE * (count + 2))
+def element_nodes(data: BeamData, count: int, places: Iterable[float]) -> Array:
+    """Nodes (m) at all breaks and `places`, fine enough for `count` half-waves."""
+    longest = data.length / (_ELEMENTS_PER_HALF_WAVE * (count + 2))
     marks = sorted({*data.breaks, *places})
-    parts = [
+    pieces = [
         np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[:-1]
         for a, b in itertools.pairwise(marks)
     ]
-    return np.append(np.concatenate(parts), data.length)
+    return np.append(np.concatenate(pieces), data.length)
 
 
-def node_at(nodes: Array, x: float) -> int:
-    """The node at a place, or nearest to it."""
+def nearest_node(nodes: Array, x: float) -> int:
+    """Index of the node nearest to x (m)."""
     return int(np.argmin(np.abs(nodes - x)))
 
 
 def _eigenvectors(k: Array, m: Array, fixed: Iterable[int], count: int) -> Array:
-    """Columns of the `count` lowest eigenvectors with the coordinates `fixed` held."""
+    """The `count` lowest eigenvectors as columns, with the coordinates `fixed` at zero."""
     free = np.setdiff1d(np.arange(len(k)), list(fixed))
     lower = np.linalg.cholesky(m[np.ix_(free, free)])
     reduced = np.linalg.solve(lower, np.linalg.solve(lower, k[np.ix_(free, free)]).T)
@@ -209,9 +210,9 @@ def _eigenvectors(k: Array, m: Array, fixed: Iterable[int], count: int) -> Array
     return full
 
 
-def _scaled(nodes: Array, u: Array) -> Array:
-    """To a mean square of about one, and positive where the shape first moves."""
+def _normalised(nodes: Array, u: Array) -> Array:
+    """Nodal values scaled to a mean square of about one, positive where first nonzero."""
     values = u[::2]
-    size = np.sqrt(np.trapezoid(values**2, nodes) / (nodes[-1] - nodes[0]))
-    moving = np.flatnonzero(np.abs(values) > 1e-3 * np.abs(values).max())
-    return u * (np.sign(values[moving[0]]) / size)
+    scale = np.sqrt(np.trapezoid(values**2, nodes) / (nodes[-1] - nodes[0]))
+    nonzero = np.flatnonzero(np.abs(values) > 1e-3 * np.abs(values).max())
+    return u * (np.sign(values[nonzero[0]]) / scale)

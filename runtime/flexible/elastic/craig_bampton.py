@@ -25,7 +25,7 @@ from mstmm.array_validation import Array
 from ..resolution import resolved_frequency, ritz_frequencies
 from .finite_element_model import ElasticModel
 from .interface_nodes import Port
-from .interface_reduction import Clamped, Sections, moved_to
+from .interface_reduction import Clamped, Sections, twist_transform
 
 FRAMES = ("tangent", "mean")
 
@@ -139,7 +139,7 @@ def resolution(reduction: Reduction, release: Release | None) -> float:
     inverse iteration.
     """
     sections, held, model = reduction.sections, reduction.held, reduction.sections.model
-    at_origin = model.rigid @ moved_to(-held.position)
+    at_origin = model.rigid @ twist_transform(-held.position)
     motions = at_origin @ (np.zeros((6, 0)) if release is None else release.twists)
     shapes = reduction.shapes - at_origin @ reduction.motion(held)
     coupling = motions.T @ model.mass
@@ -161,7 +161,7 @@ def _released_shapes(
 ) -> Array:
     """(w, n): attachment modes, then the lowest modes of the body as its hinge holds it; less the
     motion of the held section."""
-    at_origin = moved_to(-held.position)
+    at_origin = twist_transform(-held.position)
     motions = sections.rigid @ (at_origin @ release.twists)
     clamped = sections.clamped([held])
     rows = [sections.rows[port.name].toarray() for port in others]

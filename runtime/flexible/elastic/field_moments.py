@@ -35,7 +35,7 @@ class FieldMoments:
     how: str
 
 
-def moments(model: ElasticModel, shapes: Array) -> FieldMoments:
+def field_moments(model: ElasticModel, shapes: Array) -> FieldMoments:
     """Moments of a model's shapes (u, n)."""
     scalar, exact, how = model.scalar_mass, True, "scalar mass matrix: all moments exact"
     if scalar is None or model.unknowns == 6:

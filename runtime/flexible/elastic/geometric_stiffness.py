@@ -39,7 +39,7 @@ class SecondOrder:
     ends: Mapping[str, Array]
 
 
-def second_order(reduction: Reduction, ports: list[Port]) -> SecondOrder:
+def second_order_moments(reduction: Reduction, ports: list[Port]) -> SecondOrder:
     """The second-order fields' moments; zeros where the model has no stresses."""
     model, n = reduction.sections.model, reduction.shapes.shape[1]
     if model.stress is None:

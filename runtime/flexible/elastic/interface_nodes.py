@@ -55,7 +55,7 @@ class Port:
         return np.asarray(np.linalg.pinv(self.section(model)))
 
 
-def port(model: ElasticModel, name: str, table: Any, loaded: bool) -> Port:
+def select_port(model: ElasticModel, name: str, table: Any, loaded: bool) -> Port:
     """The port that a table of `ends` selects.
 
     Raises SceneError if it selects no nodes, nodes that do not exist, or nodes that cannot say how
@@ -135,7 +135,7 @@ def _turns(model: ElasticModel, name: str, nodes: Integers) -> None:
         )
 
 
-def refuse_shared(model: ElasticModel, ports: list[Port]) -> None:
+def check_separate_nodes(model: ElasticModel, ports: list[Port]) -> None:
     """SceneError if a node belongs to two sections that move on their own."""
     owner: dict[int, str] = {}
     for one in ports:

@@ -84,7 +84,7 @@ class Sections:
         model, found = self.model, np.zeros((self.expand.shape[1], 6))
         taken = np.concatenate([*(port.unknowns(model) for port in self._stiff), []]).astype(int)
         for k, port in enumerate(self._stiff):
-            found[6 * k : 6 * k + 6] = moved_to(port.position)
+            found[6 * k : 6 * k + 6] = twist_transform(port.position)
         rest = np.setdiff1d(np.arange(model.mass.shape[0]), taken)
         found[6 * len(self._stiff) :] = model.rigid[rest]
         return found
@@ -115,7 +115,7 @@ class Sections:
         return {}
 
 
-def moved_to(point: Array) -> Array:
+def twist_transform(point: Array) -> Array:
     """(6, 6): translation and rotation at a point from translation and rotation at the origin."""
     found = np.eye(6)
     found[:3, 3:] = -np.cross(np.eye(3), point)

@@ -18,8 +18,8 @@ from mstmm.optional_packages import missing_package_error
 
 from ...platform_support.safe_files import require_regular_file
 from .finite_element_model import ElasticModel
-from .mesh_file_references import refuse_outside
-from .surface_mesh import outside
+from .mesh_file_references import check_referenced_files
+from .surface_mesh import boundary_triangles
 
 #: Cells of solids as meshio calls them, and the mesh that scikit-fem makes of them.
 SOLIDS = ("tetra", "tetra10", "hexahedron", "hexahedron27")
@@ -81,7 +81,7 @@ def read_mesh(path: Path, where: str, scale: float = 1.0) -> Any:
         raise missing_package_error("fem", "a mesh", error) from None
     if not path.exists():
         raise SceneError(f"{where}: there is no file {path}; give the path of a mesh")
-    refuse_outside(path, where)
+    check_referenced_files(path, where)
     try:
         with redirect_stdout(StringIO()):  # it prints empty lines
             read = meshio.read(path)
@@ -127,7 +127,7 @@ def _curved(skfem: Any, mesh: Any) -> bool:
     return isinstance(mesh, (skfem.MeshTet2, skfem.MeshHex2))
 
 
-def refuse_large(elements: int, hexahedra: bool, order: int, where: str) -> None:
+def check_element_count(elements: int, hexahedra: bool, order: int, where: str) -> None:
     """SceneError for meshes whose matrices would take minutes and many gigabytes to assemble."""
     entries = {(False, 1): 12, (False, 2): 30, (True, 1): 24, (True, 2): 81}[hexahedra, order] ** 2
     most = MOST_ENTRIES // entries
@@ -157,7 +157,7 @@ def mesh_model(
         raise SceneError(
             f"{where}: order: expected 2 on cells of degree 2, found 1; leave order out"
         )
-    refuse_large(mesh.nelements, isinstance(mesh, skfem.MeshHex), order, where)
+    check_element_count(mesh.nelements, isinstance(mesh, skfem.MeshHex), order, where)
     element = _element(skfem, mesh, order)
     look(_outline(skfem, mesh, element, where))
     vector = _basis(skfem, mesh, skfem.ElementVector(element), order, where)
@@ -173,7 +173,7 @@ def mesh_model(
         scalar_mass=mass.tocsr(),
         sets=_sets(mesh, scalar),
         stress=MeshStress(vector, material),
-        faces=outside(mesh, scalar),
+        faces=boundary_triangles(mesh, scalar),
         definite=True,  # sums of squares with positive weights
         notes=(f"{mesh.nelements} elements of degree {order}, {vector.N} unknowns",),
         warnings=(f"{where}: {LOCKING}",) if order == 1 else (),

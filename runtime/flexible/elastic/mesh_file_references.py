@@ -18,7 +18,7 @@ from mstmm.safe_text import escape_control_characters
 _HDF5 = (".h5", ".hdf5", ".hdf", ".h5m", ".med", ".cgns", ".hmf")
 
 
-def refuse_outside(path: Path, where: str) -> None:
+def check_referenced_files(path: Path, where: str) -> None:
     """SceneError if `path`, or a file of its folder that it names, names one elsewhere."""
     _walk(path, path.parent.resolve(), where, ())
 

@@ -22,19 +22,19 @@ from mstmm.scene.tables.hinge_frames import initial_motion_axes
 from mstmm.scene.validators.scalars_and_vectors import GROUND, split_reference
 
 from ...platform_support.subprocess_call import run_in_subprocess
-from ..mass_definiteness import depends_on_count, stays_definite
+from ..mass_definiteness import is_definite_with_first_shape, is_mass_definite
 from ..modal_body import ModalBody
 from ..modal_port import ModalPort
 from ..numerical_checks import checked_result
 from ..support_motion import Supports
 from .craig_bampton import Reduction, Release, reduce, resolution
-from .field_moments import moments
+from .field_moments import field_moments
 from .finite_element_model import ElasticModel
-from .geometric_stiffness import SecondOrder, second_order, truncation
-from .interface_nodes import Port, port, refuse_shared
+from .geometric_stiffness import SecondOrder, second_order_moments, truncation
+from .interface_nodes import Port, check_separate_nodes, select_port
 from .matrices import from_arrays, load_matrices, save_matrices
 from .matrix_checks import check_matrices
-from .mesh import Material, box_mesh, mesh_model, read_mesh, refuse_large
+from .mesh import Material, box_mesh, check_element_count, mesh_model, read_mesh
 from .surface_mesh import skin
 
 if TYPE_CHECKING:
@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from mstmm.scene.tables.law import LawEntry
 
 __all__ = [
-    "elastic_bodies", "elastic_body", "modal_body", "model_of", "rigid_of", "save_matrices",
+    "elastic_bodies", "elastic_body", "elastic_model", "modal_body", "rigid_inertia_and_ends",
+    "save_matrices",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -83,14 +84,14 @@ def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
     if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
         return body
     turns, support = _turns(body), Supports(scene).of(body.name)
-    natural = frame if depends_on_count(body, held, support, turns) else ""
+    natural = frame if is_definite_with_first_shape(body, held, support, turns) else ""
     why = "mean, because the mass matrix stays definite there"
     why += f", {natural} with fewer shapes" if natural else ""
     return replace(_made(source, held, used, free, "mean", why), unmoved_frame=natural)
 
 
 def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
-    return stays_definite(body, body.ports[held], Supports(scene).of(body.name), _turns(body))
+    return is_mass_definite(body, body.ports[held], Supports(scene).of(body.name), _turns(body))
 
 
 def _turns(body: ModalBody) -> Array:
@@ -146,11 +147,11 @@ def _unknowns(elastic: Elastic) -> float:
 def _reduced(
     elastic: Elastic, held: str, used: frozenset[str], free: Freedom, frame: str, why: str
 ) -> ModalBody:
-    model = model_of(elastic)
+    model = elastic_model(elastic)
     ports = []
     for name, end in elastic.ends.items():
         loaded = name in used if end.static_shapes is None else end.static_shapes
-        ports.append(port(model, name, end, loaded or name == held))
+        ports.append(select_port(model, name, end, loaded or name == held))
     modes = AUTO_MODES if elastic.modes is None else elastic.modes
     notes = [f"frame: {why}"]
     if elastic.modes is None:
@@ -195,18 +196,18 @@ def _release(elastic: Elastic, held: str, free: Freedom) -> Release:
     return Release(*(np.array(some).reshape(-1, 6).T for some in (twists, loaded)))
 
 
-def rigid_of(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
+def rigid_inertia_and_ends(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
     """(6, 6) inertia about the origin and the ends of an [[elastic]] table, without any shapes."""
     return _maybe_apart(_rigid, elastic)
 
 
 def _rigid(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
-    model = model_of(elastic)
-    ends = {name: port(model, name, end, False) for name, end in elastic.ends.items()}
+    model = elastic_model(elastic)
+    ends = {name: select_port(model, name, end, False) for name, end in elastic.ends.items()}
     return model.inertia, ends
 
 
-def model_of(elastic: Elastic) -> ElasticModel:
+def elastic_model(elastic: Elastic) -> ElasticModel:
     """The checked matrices of an [[elastic]] table."""
     where = f'elastic "{elastic.name}"'
     if elastic.matrices is not None:
@@ -221,14 +222,14 @@ def model_of(elastic: Elastic) -> ElasticModel:
         mesh = read_mesh(Path(elastic.mesh), where, elastic.scale or 1.0)
     else:
         assert elastic.box is not None
-        refuse_large(prod(elastic.box.divisions), True, elastic.order or 2, where)
+        check_element_count(prod(elastic.box.divisions), True, elastic.order or 2, where)
         mesh = box_mesh(elastic.box.size, elastic.box.divisions, elastic.box.corner)
     assert elastic.young is not None and elastic.density is not None
     material = Material(elastic.young, elastic.poisson or 0.0, elastic.density)
 
     def look(outline: ElasticModel) -> None:
         for name, end in elastic.ends.items():
-            port(outline, name, end, False)
+            select_port(outline, name, end, False)
 
     return check_matrices(mesh_model(mesh, material, elastic.order or 2, where, look))
 
@@ -254,13 +255,13 @@ def _frame(elastic: Elastic, holder: Hinge | None, held: str) -> tuple[str, str]
     """The frame and why: a hinge that leaves rotations free should not hold the frame's section."""
     if elastic.frame != "auto":
         return elastic.frame, f"{elastic.frame}, as given"
-    if holder is not None and turns_with(holder):
+    if holder is not None and prescribes_rotation(holder):
         return "tangent", f'tangent at "{held}", which hinge "{holder.name}" turns with it'
     what = "no hinge holds it" if holder is None else f'hinge "{holder.name}" lets it turn freely'
     return "mean", f"mean, because {what}"
 
 
-def turns_with(hinge: Hinge) -> bool:
+def prescribes_rotation(hinge: Hinge) -> bool:
     """True if the hinge prescribes every rotation of its outboard side for all time."""
     if hinge.facts is not None and not hinge.facts.turns:
         return not hinge.lets_go
@@ -298,10 +299,10 @@ def elastic_body(
     Modal coordinates are in m; modal masses equal the body's mass, K and Mff are diagonal.
     """
     ports = list(ports)
-    refuse_shared(model, ports)
+    check_separate_nodes(model, ports)
     holding = next(p for p in ports if p.name == held)
     reduction = reduce(model, ports, holding, modes, frame, highest, release)
-    found = moments(model, reduction.shapes)
+    found = field_moments(model, reduction.shapes)
     K = np.diag(found.mass * reduction.frequencies**2)
     stiff = _stiffened(reduction, ports, stiffening)
     return ModalBody(
@@ -321,7 +322,7 @@ def elastic_body(
 
 def _stiffened(reduction: Reduction, ports: list[Port], stiffening: bool) -> SecondOrder:
     if stiffening:
-        return second_order(reduction, ports)
+        return second_order_moments(reduction, ports)
     n = reduction.shapes.shape[1]
     none = {port.name: np.zeros((6, n, n)) for port in ports}
     return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), none)

@@ -41,7 +41,7 @@ def _together(points: Array, cell: float) -> Integers:
     return np.asarray((cubes[:, 0] * wide[1] + cubes[:, 1]) * wide[2] + cubes[:, 2])
 
 
-def outside(mesh: Any, scalar: Any) -> Integers:
+def boundary_triangles(mesh: Any, scalar: Any) -> Integers:
     """(m, 3) triangles of nodes on the boundary of a mesh of scikit-fem, seen from outside
     anticlockwise; nodes halfway along edges divide them."""
     facets = mesh.boundary_facets()

@@ -24,9 +24,9 @@ from mstmm.scene.validators.validation_messages import did_you_mean
 from ...engine.harmonic_response import Complex, DynamicStiffnessBodies
 from ...engine.tangent_matrix import TangentMatrix
 from ...flexible.beam.beam_data import BeamData, beam_data
-from ...flexible.beam.boundary_conditions import BeamEnvironment, holding
+from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
 from ...flexible.beam.dynamic_stiffness import BENDING, HarmonicBeam, harmonic_beam
-from ...flexible.kernel_inputs import in_frame
+from ...flexible.kernel_inputs import transform_body
 from ...packing.scene_parameters import data_of, made_of
 from ..frozen_loads import standing
 from ..input_channels import GROUND, Channel, channel
@@ -112,7 +112,7 @@ def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> Exac
     tables = {beam.name: beam for beam in model.scene.beam if beam.name in names}
     for name in names:
         data = beam_data(tables[name])
-        held = holding(around, tables[name], data)
+        held = boundary_conditions(around, tables[name], data)
         _refuse(tables[name], data, [held.x, *(end.x for end in held.ends)])
     found = _with_ends_as_shapes(linear, names)
     lossy = by_name(found.model, losses)
@@ -204,7 +204,7 @@ def _distinct(
     for name, loss in zip(names, losses, strict=True):
         place = packed.placements[name]
         turn = np.array(place.rotation)
-        body = in_frame(packed.flexible[name], turn, np.array(place.origin))
+        body = transform_body(packed.flexible[name], turn, np.array(place.origin))
         beam = harmonic_beam(
             beam_data(tables[name]), body, turn.T, tables[name].damping.stiffness, loss
         )

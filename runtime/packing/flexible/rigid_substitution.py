@@ -258,7 +258,7 @@ def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:
 def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
     from mstmm.scene.tables.beam import Beam
 
-    from ...flexible.elastic.modal_elastic import rigid_of
+    from ...flexible.elastic.modal_elastic import rigid_inertia_and_ends
 
     if isinstance(body, Beam):
         if body.viscous_drag:
@@ -270,7 +270,7 @@ def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
     if modal is not None:
         turning = np.trace(modal.second) * np.eye(3) - modal.second
         return _rigid_body(body.name, modal.mass, modal.first, turning, modal.ports)
-    j, ports = rigid_of(body)
+    j, ports = rigid_inertia_and_ends(body)
     first = np.array([j[5, 1], j[3, 2], j[4, 0]])
     return _rigid_body(body.name, float(j[0, 0]), first, j[3:, 3:], ports)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.scene.checks.welded_beams import beam_lines
 
-from ...flexible.memory_chunks import slices
+from ...flexible.memory_chunks import chunk_slices
 from ...flexible.modal_scales import radius_of_gyration
 from . import range_estimators as e
 from .lateral_buckling import lateral_load_ratio, quadrature_rule
@@ -206,7 +206,7 @@ def _load_ratio_bounds(
         return None
     ratios = []
     try:
-        for part in (some[k] for k in slices(len(some), 4 * motion.body.n**2)):
+        for part in (some[k] for k in chunk_slices(len(some), 4 * motion.body.n**2)):
             end_loads = {
                 port: (force[part], moment[part]) for port, (force, moment) in loads.items()
             }

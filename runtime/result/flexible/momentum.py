@@ -16,7 +16,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
-from ...flexible.kernel_inputs import moments_of
+from ...flexible.kernel_inputs import moment_inputs
 from ...flexible.modal_kernels import kernel
 from ...kernels.numpy_kernels import evaluate
 from .motion import tilde
@@ -172,7 +172,7 @@ def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
     for first in range(0, len(motion.t), rows):
         samples = slice(first, first + rows)
         inputs = {
-            **moments_of(body), "eta": motion.eta[samples], "etad": motion.etad[samples],
+            **moment_inputs(body), "eta": motion.eta[samples], "etad": motion.etad[samples],
             "v": motion.frame_velocity[samples], "w": motion.frame_spin[samples],
         }  # fmt: skip
         outputs = evaluate(kernel("momentum"), inputs, body.n)

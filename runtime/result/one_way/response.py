@@ -20,7 +20,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 from mstmm.risk import RUN, Risk
 
-from ...flexible.kernel_inputs import moments_of
+from ...flexible.kernel_inputs import moment_inputs
 from ...flexible.modal_kernels import kernel
 from ...kernels.numpy_kernels import evaluate
 from ...run.run_execution import RunMonitor, first_run
@@ -193,7 +193,7 @@ def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -
     acceleration = inward(points[:, 6:9] - np.array(model.scene.gravity))
     zero = np.zeros((len(points), body.n))
     inputs = {
-        **moments_of(body), "K": body.K, "D": body.D, "eta": zero, "etad": zero,
+        **moment_inputs(body), "K": body.K, "D": body.D, "eta": zero, "etad": zero,
         "motion": np.concatenate([spin, spin_rate, acceleration], axis=1),
     }  # fmt: skip
     loads = -evaluate(kernel("residual"), inputs, body.n)["e_f"]

@@ -141,7 +141,7 @@ def test_a_beam_that_may_spin_twists_about_its_mean() -> None:
 def test_too_few_shapes_for_the_moments_at_the_ends_are_warned_about() -> None:
     body = body_of(HELD, modes={"y": 1}, more=carrying("fixed"))
     assert len(body.warnings) == 1
-    assert 'beam "b": modes: 1 in direction y cannot carry' in body.warnings[0]
+    assert 'beam "b": modes: 1 in direction y cannot represent' in body.warnings[0]
     assert not body_of(HELD, modes={"y": 2}, more=carrying("fixed")).warnings
 
 

@@ -11,7 +11,7 @@ from flexible.beam_scenes import HELD, PIN, body_of
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.flexible.mass_definiteness import is_definite_at, stays_definite
+from mstmm.runtime.flexible.mass_definiteness import is_definite_at, is_mass_definite
 from mstmm.runtime.flexible.modal_body import ModalBody
 from mstmm.runtime.flexible.support_motion import ANY, Supports
 
@@ -44,7 +44,7 @@ def cantilever(parts: int, shapes: int, **beam: Any) -> mstmm.Model:
 def definite(body: ModalBody, slope: float) -> bool:
     assert body.shapes is not None
     turns = body.shapes.at(np.linspace(0, body.shapes.length, 17)).theta
-    return stays_definite(body, body.ports["root"], ANY, turns * (0.375 / slope))
+    return is_mass_definite(body, body.ports["root"], ANY, turns * (0.375 / slope))
 
 
 @pytest.mark.parametrize(

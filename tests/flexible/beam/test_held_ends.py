@@ -13,7 +13,7 @@ from flexible.beam_scenes import FREE, HELD, PIN, body_of
 from scipy.optimize import brentq
 
 import mstmm
-from mstmm.runtime.flexible.beam.restraint import Edge, blocks
+from mstmm.runtime.flexible.beam.restraint import Edge, biconnected_components
 from mstmm.runtime.flexible.flexible_bodies import modal_bodies
 
 WEIGHT, BENDING = 9.81, 10.0
@@ -107,7 +107,7 @@ def test_the_rod_of_a_slider_crank_needs_no_axial_shape(drive: dict[str, str]) -
 def test_blocks_of_a_graph() -> None:
     """Two triangles that share the ground, one of them at the end of a bridge."""
     pairs = ["0a", "ab", "b0", "0c", "cd", "de", "ec"]
-    parts = blocks([Edge((pair[0], pair[1]), None) for pair in pairs])
+    parts = biconnected_components([Edge((pair[0], pair[1]), None) for pair in pairs])
     found = sorted(sorted("".join(edge.ends) for edge in part) for part in parts)
     assert found == [["0a", "ab", "b0"], ["0c"], ["cd", "de", "ec"]]
 

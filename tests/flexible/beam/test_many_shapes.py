@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.flexible.beam import beam_kernels
-from mstmm.runtime.flexible.beam.multilinear import known, terms
+from mstmm.runtime.flexible.beam.multilinear import kernel_terms, known_factor
 from mstmm.runtime.flexible.modal_body import ModalBody
 
 Array = NDArray[np.float64]
@@ -58,12 +58,14 @@ def peak(work: Callable[[], object]) -> int:
 def test_a_kernel_of_pairs_is_the_sum_of_its_terms(kernel: str, rng: np.random.Generator) -> None:
     groups = GROUPS[kernel]
     given = {
-        k: rng.normal(size=(beam_kernels.rows(kernel, k), 5)) for group in groups for k in group
+        k: rng.normal(size=(beam_kernels.input_size(kernel, k), 5))
+        for group in groups
+        for k in group
     }
     whole = [np.concatenate([given[name] for name in group]) for group in groups]
     for name, values in beam_kernels.evaluate(kernel, given).items():
-        for index, of_entry in terms(kernel, *groups)[name].items():
-            total = sum((known(term, *whole) for term in of_entry), np.zeros(5))
+        for index, of_entry in kernel_terms(kernel, *groups)[name].items():
+            total = sum((known_factor(term, *whole) for term in of_entry), np.zeros(5))
             np.testing.assert_allclose(values[index], total, rtol=1e-13, atol=1e-13)
 
 
@@ -134,7 +136,7 @@ def test_more_points_of_mass_than_memory_are_refused_by_name() -> None:
             "basis": "clamped-free", "frame": "tangent", "ends": {"mid": 0.5}}  # fmt: skip
     hinge = FIXED | {"outboard": "b.mid"}
     scene = mstmm.Scene(gravity=DOWN, beam=[PLAIN | keys], hinge=[hinge])
-    with pytest.raises(mstmm.SceneError, match=r'beam "b": .* points of mass .* give fewer shapes'):
+    with pytest.raises(mstmm.SceneError, match=r'beam "b": .* mass points .* give fewer shapes'):
         mstmm.compile(scene, engine="looped")
 
 

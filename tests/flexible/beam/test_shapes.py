@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from mstmm.runtime.flexible.beam.gauss_quadrature import gauss_between
-from mstmm.runtime.flexible.beam.shape_functions import Eigenfunction, Piecewise, Shape, Sine, root
+from mstmm.runtime.flexible.beam.shape_functions import (
+    Eigenfunction,
+    Piecewise,
+    Shape,
+    Sine,
+    wave_number,
+)
 
 BENDING = ("clamped-free", "free-free", "clamped-clamped")
 
@@ -48,25 +54,25 @@ def integral(function: Any) -> float:
 @pytest.mark.parametrize("number", [1, 2, 11, 13, 50, 100])
 def test_shapes_and_four_derivatives_keep_all_digits(kind: str, number: int) -> None:
     beta, value = exact(kind, number)
-    assert root(kind, number) == pytest.approx(float(beta), rel=4e-16)
+    assert wave_number(kind, number) == pytest.approx(float(beta), rel=4e-16)
     shape = Eigenfunction(kind, number, 0.0, 1.0)
     places = np.array([0.0, 0.013, 0.21, 0.5, 0.77, 0.99, 1.0])
     for d in range(5):
         reference = np.array([value(x, d) for x in places])
-        found = shape(places, d) / root(kind, number) ** d
+        found = shape(places, d) / wave_number(kind, number) ** d
         assert np.abs(found - reference).max() < 5e-14
 
 
 def test_roots_are_those_of_the_tables() -> None:
     clamped = [1.8751040687, 4.6940911330, 7.8547574382]
     free = [4.7300407449, 7.8532046241, 10.9956078380]
-    assert [root("clamped-free", k) for k in (1, 2, 3)] == pytest.approx(clamped, abs=6e-11)
-    assert [root("free-free", k) for k in (1, 2, 3)] == pytest.approx(free, abs=6e-11)
+    assert [wave_number("clamped-free", k) for k in (1, 2, 3)] == pytest.approx(clamped, abs=6e-11)
+    assert [wave_number("free-free", k) for k in (1, 2, 3)] == pytest.approx(free, abs=6e-11)
 
 
 @pytest.mark.parametrize("k", [1, 2, 5, 12, 40])
 def test_closed_forms_of_the_clamped_beam(k: int) -> None:
-    shape, beta = Eigenfunction("clamped-free", k, 0.0, 1.0), root("clamped-free", k)
+    shape, beta = Eigenfunction("clamped-free", k, 0.0, 1.0), wave_number("clamped-free", k)
     sigma = float((mpmath.cosh(beta) + mpmath.cos(beta)) / (mpmath.sinh(beta) + mpmath.sin(beta)))
     end = np.array([1.0])
     assert integral(shape) == pytest.approx(2 * sigma / beta, abs=1e-14)
@@ -81,7 +87,7 @@ def test_closed_forms_of_the_clamped_beam(k: int) -> None:
 
 @pytest.mark.parametrize("k", [1, 2, 5, 12, 40])
 def test_closed_forms_of_free_and_supported_beams(k: int) -> None:
-    free, beta = Eigenfunction("free-free", k, 0.0, 1.0), root("free-free", k)
+    free, beta = Eigenfunction("free-free", k, 0.0, 1.0), wave_number("free-free", k)
     assert abs(integral(free)) < 1e-14
     assert abs(integral(lambda x: x * free(x))) < 1e-14
     assert free(np.array([0.0, 1.0])) == pytest.approx([2.0, 2.0 * (-1) ** (k + 1)], abs=1e-13)

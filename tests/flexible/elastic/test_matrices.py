@@ -12,7 +12,7 @@ from flexible import elastic_bar as bar
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mstmm.runtime.flexible.elastic.field_moments import moments
+from mstmm.runtime.flexible.elastic.field_moments import field_moments
 from mstmm.runtime.flexible.elastic.finite_element_model import ElasticModel
 from mstmm.runtime.flexible.elastic.matrices import from_arrays
 from mstmm.runtime.flexible.elastic.modal_elastic import elastic_bodies, save_matrices
@@ -87,7 +87,7 @@ def test_moments_of_a_mass_that_is_not_scalar() -> None:
     mass = uneven_mass(nodes)
     model = from_arrays("here", mass, stiffness, nodes)
     shapes = np.random.default_rng(5).normal(size=(12, 3))
-    found = moments(model, shapes)
+    found = field_moments(model, shapes)
     assert "not scalar" in found.how
     rigid = _rigid(nodes)
     inertia, carried = rigid.T @ mass @ rigid, rigid.T @ mass @ shapes
@@ -122,8 +122,8 @@ def test_masses_in_nodes_with_rotations() -> None:
     lumps = np.array([0.5, 1, 2, 1, 0.5])
     mass = sparse.csr_array(np.kron(np.diag(lumps), np.diag([1.0, 1, 1, 0, 0, 0])))
     shapes = np.random.default_rng(6).normal(size=(30, 2))
-    found = moments(replace(free, mass=mass), shapes)
-    assert "all moments exact" in found.how and "not scalar" in moments(free, shapes).how
+    found = field_moments(replace(free, mass=mass), shapes)
+    assert "all moments exact" in found.how and "not scalar" in field_moments(free, shapes).how
     moved = shapes.reshape(5, 6, 2)[:, :3]
     assert np.allclose(found.E, np.einsum("i,ia,ibk->abk", lumps, free.nodes, moved))
     assert np.allclose(found.F, np.einsum("i,iak,ibl->abkl", lumps, moved, moved))

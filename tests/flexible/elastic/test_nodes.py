@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 import mstmm
 from mstmm.runtime.flexible.elastic.craig_bampton import Release, reduce
-from mstmm.runtime.flexible.elastic.interface_nodes import port
-from mstmm.runtime.flexible.elastic.modal_elastic import model_of
+from mstmm.runtime.flexible.elastic.interface_nodes import select_port
+from mstmm.runtime.flexible.elastic.modal_elastic import elastic_model
 
 Array = NDArray[np.float64]
 
@@ -34,8 +34,8 @@ class Nodes:
 
     def __init__(self, elastic: dict[str, Any]) -> None:
         table = bar.scene(elastic).elastic[0]
-        self.model = model_of(table)
-        ports = [port(self.model, name, end, True) for name, end in table.ends.items()]
+        self.model = elastic_model(table)
+        ports = [select_port(self.model, name, end, True) for name, end in table.ends.items()]
         free = Release(np.eye(6), np.zeros((6, 0)))
         reduction = reduce(self.model, ports, ports[0], table.modes or 0, "tangent", release=free)
         self.shapes = reduction.shapes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....runtime.flexible.beam.shape_functions import root
+from ....runtime.flexible.beam.shape_functions import wave_number
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...parameter_scale import COUNT_SCALE
 from ...shared_scenes import compile_looped
@@ -16,7 +16,7 @@ ELEMENT_COUNT, SHAPE_COUNT = 4, 6
 
 def _error_by_signs(number: float) -> float:
     wavenumber = determinant.clamped_free_wavenumber(int(number), ELEMENT_COUNT)
-    exact = root("clamped-free", int(number))
+    exact = wave_number("clamped-free", int(number))
     return abs(wavenumber / exact - 1) if np.isfinite(wavenumber) else 1.0
 
 
@@ -36,7 +36,7 @@ def _error_by_pivots(number: float) -> float:
     modes = compile_looped({"gravity": [0, 0, 0], "beam": beams, "hinge": hinges}).modes(count)
     if not modes.complete:
         return 1.0
-    return abs(float(np.sqrt(modes.omega[-1])) / root("clamped-free", count) - 1)
+    return abs(float(np.sqrt(modes.omega[-1])) / wave_number("clamped-free", count) - 1)
 
 
 CASE = CaseDefinition(
