@@ -80,7 +80,7 @@ def test_long_bodies_are_made_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """The numbers are those of this process, and a body that is refused is refused in its words."""
 
     def made(**changes: Any) -> ModalBody:
-        modal_elastic._made.cache_clear()
+        modal_elastic._cached_body.cache_clear()
         return modal_elastic.elastic_bodies(bar.scene(bar.table(**changes)))["bar"]
 
     here, used = made(), []

@@ -11,7 +11,7 @@ from view import scenes
 import mstmm
 from mstmm.errors import EnvironmentFailure, SceneError
 from mstmm.runtime.flexible.elastic.modal_elastic import elastic_model
-from mstmm.runtime.flexible.elastic.surface_mesh import MOST, skin
+from mstmm.runtime.flexible.elastic.surface_mesh import MAX_NODES, skin
 from mstmm.runtime.result.scene3d import body_geometry
 from mstmm.runtime.result.scene3d.camera import FIELD_OF_VIEW, choose_camera
 from mstmm.runtime.result.scene3d.frame_times import natural_speed
@@ -190,7 +190,7 @@ def test_many_nodes_are_seen_by_some() -> None:
     assert model.faces is not None
     assert len(np.unique(model.faces)) == 6 * 14 * 14 + 2
     seen = skin(model, np.zeros((3 * len(model.nodes), 1)))
-    assert 300 < len(seen.nodes) <= MOST
+    assert 300 < len(seen.nodes) <= MAX_NODES
     a, b, c = np.moveaxis(seen.nodes[seen.faces], 1, 0)
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(1.0, rel=0.15)
 

@@ -1,8 +1,8 @@
-"""Geometric stiffening of an elastic body: its stiffness under the stresses of unit loads.
+"""Geometric stiffness of an elastic body under the stresses of unit loads.
 
 A modal body's displacement is u = phi eta - 1/2 eta^T g eta.  The virtual work of a load per volume
 rho b on the second-order part is -b . int rho g eta deta: the load adds b . int rho g to the
-stiffness.  The finite elements give the same stiffness as that of the static stresses under the
+stiffness.  The finite elements give it as the geometric stiffness of the static stresses under the
 load (tension stiffens), so that
 
     G_a     = int rho g_a       = the stiffness under the load rho e_a
@@ -10,9 +10,8 @@ load (tension stiffens), so that
     g_a at a port               = the stiffness under a unit force along a at the port
 
 and a unit acceleration of the frame along a, whose load is -rho e_a, adds -G_a.  In a tangent frame
-the held section carries the reaction.  In a mean frame every load is taken with the acceleration
-that the free body would have under it, so that G = 0 and the mass centre stays in its place to
-second order.
+the held section carries the reaction.  In a mean frame every load is balanced by the inertia of the
+free body, so that G = 0 and the mass centre does not move to second order.
 """
 
 from __future__ import annotations
@@ -31,8 +30,11 @@ from .interface_nodes import Port
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """G (3, n, n) kg, X (3, 3, n, n) kg m, and of every port (6, n, n) displacement of second order
-    in 1/m and rotation (zero: the stresses are those of unit forces)."""
+    """Moments of the second-order field: G (3, n, n) kg and X (3, 3, n, n) kg m.
+
+    `ends` (6, n, n) are second-order displacement in 1/m and rotation of every port; the rotation
+    is zero, because only unit forces are applied.
+    """
 
     G: Array
     X: Array
@@ -40,43 +42,45 @@ class SecondOrder:
 
 
 def second_order_moments(reduction: Reduction, ports: list[Port]) -> SecondOrder:
-    """The second-order fields' moments; zeros where the model has no stresses."""
+    """Moments of the second-order field; zeros for a model without stresses."""
     model, n = reduction.sections.model, reduction.shapes.shape[1]
     if model.stress is None:
-        none = {port.name: np.zeros((6, n, n)) for port in ports}
-        return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), none)
+        zeros = {port.name: np.zeros((6, n, n)) for port in ports}
+        return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), zeros)
     moving = [p for p in ports if reduction.frame == "mean" or p is not reduction.held]
     loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
     if reduction.frame == "mean":
         loads = reduction.sections.relieved(loads, reduction.sections.rigid)
     static = reduction.sections.clamped([reduction.held]).statics(loads)
-    families = model.stress(reduction.sections.expand @ static, reduction.shapes)
-    families = (families + families.transpose(0, 2, 1)) / 2
+    stiffnesses = model.stress(reduction.sections.expand @ static, reduction.shapes)
+    stiffnesses = (stiffnesses + stiffnesses.transpose(0, 2, 1)) / 2
     if reduction.frame == "mean":
-        families[:3] = 0.0  # rounding: a free body under its own acceleration has no stress
+        stiffnesses[:3] = 0.0  # only rounding: a uniformly accelerated free body is free of stress
     ends = {port.name: np.zeros((6, n, n)) for port in ports}
-    for port, drawn in zip(moving, families[12:].reshape(-1, 3, n, n), strict=True):
-        ends[port.name][:3] = drawn
-    return SecondOrder(families[:3], families[3:12].reshape(3, 3, n, n), ends)
+    for port, port_stiffness in zip(moving, stiffnesses[12:].reshape(-1, 3, n, n), strict=True):
+        ends[port.name][:3] = port_stiffness
+    return SecondOrder(stiffnesses[:3], stiffnesses[3:12].reshape(3, 3, n, n), ends)
 
 
 def truncation(reduction: Reduction, ports: list[Port]) -> Truncation:
-    """What the shapes miss of the deflections under the loads that the body may have."""
+    """Truncation error of the shapes in the deflections under all loads on the body."""
     sections, shapes = reduction.sections, reduction.shapes
     inertia = -sections.expand.T @ (sections.model.mass @ shapes)
     wrenches = [sections.rows[port.name].toarray().T for port in ports]
     loads = np.hstack([*wrenches, _body_loads(reduction)[:, 3:], inertia])
     loads = sections.relieved(loads, sections.rigid)
-    moved = sections.clamped([reduction.held]).statics(loads)
-    pushed = sections.unknowns(shapes).T @ loads
-    modal = sections.model.inertia[0, 0] * reduction.frequencies**2
-    kept = pushed.T @ (pushed / modal[:, None])
-    ends = 6 * len(ports)
-    return Truncation(tuple(port.name for port in ports), loads[:, :ends].T @ moved, kept[:ends])
+    displacements = sections.clamped([reduction.held]).statics(loads)
+    modal_loads = sections.unknowns(shapes).T @ loads
+    modal_stiffness = sections.model.inertia[0, 0] * reduction.frequencies**2
+    kept = modal_loads.T @ (modal_loads / modal_stiffness[:, None])
+    count = 6 * len(ports)
+    return Truncation(
+        tuple(port.name for port in ports), loads[:, :count].T @ displacements, kept[:count]
+    )
 
 
 def _body_loads(reduction: Reduction) -> Array:
-    """(w, 12): rho e_a, then rho r0_a e_b with b running fastest."""
+    """Body loads (w, 12): rho e_a, then rho r0_a e_b with b running fastest."""
     model = reduction.sections.model
     weights = [np.ones(len(model.nodes)), *model.nodes.T]
     columns = [model.body_load(b, weight) for weight in weights for b in range(3)]
@@ -84,5 +88,5 @@ def _body_loads(reduction: Reduction) -> Array:
 
 
 def _port_loads(reduction: Reduction, port: Port) -> Array:
-    """(w, 3): unit forces at the port's point."""
+    """Unit forces (w, 3) at the point of a port."""
     return np.asarray(reduction.sections.rows[port.name].toarray().T[:, :3])

@@ -1,4 +1,4 @@
-"""Whether matrices describe an elastic body that is free in space: refused by name if not."""
+"""Checks that matrices describe one free elastic body."""
 
 from __future__ import annotations
 
@@ -9,61 +9,61 @@ import numpy as np
 
 from .finite_element_model import ElasticModel
 
-#: Largest difference of mirrored entries, of the largest entry.
+#: Largest difference of mirrored entries, relative to the largest entry.
 SYMMETRIC = 1e-9
-#: Largest force of a rigid-body motion, of the sum of its terms' magnitudes: files with seven
-#: digits pass.
+#: Largest force in a rigid-body motion, relative to the sum of the magnitudes of its terms; files
+#: with seven digits pass.
 RIGID = 1e-6
-#: Negative eigenvalues below this part of the diagonal are rounding.
+#: Magnitude of negative eigenvalues, relative to the diagonal, that counts as rounding.
 DEFINITE = 1e-9
-#: Most multiplications of a factorisation row by row, unknowns numbered for the least: about half a
-#: minute for the one that is used, which needs a tenth of them.
+#: Largest number of multiplications of a banded factorisation with reordered unknowns.  The actual
+#: factorisation needs a tenth of them, about half a minute.
 MOST_WORK = 5e11
-#: Smallest entry of a matrix, square of a frequency and length, and the inverse of the largest.
-_TINY = 1e-60
-_MOTIONS = ("translation along x", "translation along y", "translation along z",
+#: Smallest matrix entry, squared frequency and length; the largest is its inverse.
+_SMALLEST = 1e-60
+_RIGID_MOTIONS = ("translation along x", "translation along y", "translation along z",
             "rotation about x", "rotation about y", "rotation about z")  # fmt: skip
 
 
 def check_matrices(model: ElasticModel) -> ElasticModel:
-    """The model with exactly symmetric matrices.
+    """Model with exactly symmetric matrices.
 
-    Raises SceneError, one sentence with what was expected and found and a way out, for matrices
-    that are unsymmetric or indefinite, a stiffness that resists rigid-body motions (a model that is
-    held somewhere), a mass that depends on the direction, and bodies in several pieces.
+    Raises SceneError for matrices that are unsymmetric or indefinite, a stiffness that resists
+    rigid-body motions (a model that is constrained somewhere), a mass that depends on the
+    direction, and bodies in several pieces.
     """
     model = replace(
         model,
-        mass=_symmetric(model, "mass", model.mass),
-        stiffness=_symmetric(model, "stiffness", model.stiffness),
+        mass=_symmetric_matrix(model, "mass", model.mass),
+        stiffness=_symmetric_matrix(model, "stiffness", model.stiffness),
         scalar_mass=None
         if model.scalar_mass is None
-        else _symmetric(model, "scalar_mass", model.scalar_mass),
+        else _symmetric_matrix(model, "scalar_mass", model.scalar_mass),
     )
-    _sizes(model)
-    _one_piece(model)
-    _affordable(model)
-    _definite(model, "mass", model.mass, "kg")
-    _equal_masses(model)
-    _rigid_motions(model)
-    _definite(model, "stiffness", model.stiffness, "N/m")
-    _scalar_mass(model)
+    _check_sizes(model)
+    _check_connected(model)
+    _check_work(model)
+    _check_definite(model, "mass", model.mass, "kg")
+    _check_equal_masses(model)
+    _check_rigid_motions(model)
+    _check_definite(model, "stiffness", model.stiffness, "N/m")
+    _check_scalar_mass(model)
     return model
 
 
-def _sizes(model: ElasticModel) -> None:
-    """Can products of the matrices and the squares of the frequencies be written as numbers?"""
+def _check_sizes(model: ElasticModel) -> None:
+    """Raise SceneError for matrices whose products would overflow or underflow."""
     mass, stiffness = float(abs(model.mass).max()), float(abs(model.stiffness).max())
     sizes = (mass, stiffness, stiffness / mass, model.size)
-    if not all(_TINY < size < 1 / _TINY for size in sizes):
+    if not all(_SMALLEST < size < 1 / _SMALLEST for size in sizes):
         raise model.refuse(
             f"expected masses and stiffnesses of a real body, found up to {mass:.3g} kg and "
-            f"{stiffness:.3g} N/m over {model.size:.3g} m, beyond what can be computed with; check "
-            "the units (m, kg/m^3, N/m^2)"
+            f"{stiffness:.3g} N/m over {model.size:.3g} m, beyond the range of double precision; "
+            "check the units (m, kg/m^3, N/m^2)"
         )
 
 
-def _symmetric(model: ElasticModel, key: str, matrix: Any) -> Any:
+def _symmetric_matrix(model: ElasticModel, key: str, matrix: Any) -> Any:
     from scipy import sparse
 
     difference, largest = abs(matrix - matrix.T), float(abs(matrix).max())
@@ -72,59 +72,60 @@ def _symmetric(model: ElasticModel, key: str, matrix: Any) -> Any:
     worst = float(difference.max())
     if worst > SYMMETRIC * largest:
         entries = difference.tocoo()
-        place = int(np.argmax(entries.data))
-        i, j = int(entries.row[place]), int(entries.col[place])
+        entry = int(np.argmax(entries.data))
+        i, j = int(entries.row[entry]), int(entries.col[entry])
         raise model.refuse(
             f"{key}: expected a symmetric matrix, found {matrix[i, j]:.6g} in row {i}, column {j} "
-            f"and {matrix[j, i]:.6g} in row {j}, column {i} (counted from 0); where only one "
-            "triangle was stored, add the other one"
+            f"and {matrix[j, i]:.6g} in row {j}, column {i} (counted from 0); if only one "
+            "triangle is stored, add the other one"
         )
     return sparse.csr_array((matrix + matrix.T) / 2)
 
 
-def _one_piece(model: ElasticModel) -> None:
+def _check_connected(model: ElasticModel) -> None:
     from scipy.sparse.csgraph import connected_components
 
-    pieces, labels = connected_components(_joined(model), directed=False)
+    pieces, labels = connected_components(_connectivity(model), directed=False)
     if pieces > 1:
         first = int(np.flatnonzero(labels != labels[0])[0])
         raise model.refuse(
             f"stiffness: expected one connected body, found {pieces} pieces (node {first}, counted "
-            f"from 0, is not joined to node 0); join them, or leave out nodes without elements"
+            f"from 0, is not connected to node 0); connect them, or remove nodes without elements"
         )
 
 
-def _joined(model: ElasticModel) -> Any:
-    """Sparse (N, N): which nodes push on which."""
+def _connectivity(model: ElasticModel) -> Any:
+    """Sparse (N, N) matrix of the pairs of nodes that the stiffness connects."""
     from scipy.sparse import csr_array
 
     d, n = model.unknowns, len(model.nodes)
     entries = model.stiffness.tocoo()
-    places = (entries.row // d, entries.col // d)
-    return csr_array((np.ones(entries.nnz, np.int8), places), shape=(n, n))
+    indices = (entries.row // d, entries.col // d)
+    return csr_array((np.ones(entries.nnz, np.int8), indices), shape=(n, n))
 
 
-def _affordable(model: ElasticModel) -> None:
+def _check_work(model: ElasticModel) -> None:
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    joined = _joined(model).tocoo()
-    place = np.empty(len(model.nodes), np.int64)
-    place[reverse_cuthill_mckee(joined.tocsr(), symmetric_mode=True)] = np.arange(len(place))
-    rows, columns = place[joined.row], place[joined.col]
-    reach = np.zeros(len(place))
-    np.maximum.at(reach, rows, np.maximum(rows - columns, 0).astype(float))
-    work = model.unknowns**3 * float(np.sum(reach**2))
+    connectivity = _connectivity(model).tocoo()
+    position = np.empty(len(model.nodes), np.int64)
+    order = reverse_cuthill_mckee(connectivity.tocsr(), symmetric_mode=True)
+    position[order] = np.arange(len(position))
+    rows, columns = position[connectivity.row], position[connectivity.col]
+    bandwidth = np.zeros(len(position))
+    np.maximum.at(bandwidth, rows, np.maximum(rows - columns, 0).astype(float))
+    work = model.unknowns**3 * float(np.sum(bandwidth**2))
     if work > MOST_WORK:
         raise model.refuse(
             f"stiffness: expected a body whose {model.stiffness.shape[0]} unknowns can be solved "
-            f"for with {MOST_WORK:.0e} multiplications (half a minute), found {work:.1e}; take "
-            "fewer divisions or a coarser mesh (a slender or thin body may have many more than a "
-            "compact one), or name the matrices of a reduced model in `matrices`"
+            f"for with {MOST_WORK:.0e} multiplications (half a minute), found {work:.1e}; use "
+            "fewer divisions or a coarser mesh (a slender or thin body may have many more unknowns "
+            "than a compact one), or give the matrices of a reduced model in `matrices`"
         )
 
 
-def _definite(model: ElasticModel, key: str, matrix: Any, unit: str) -> None:
-    """No negative eigenvalue beyond rounding, by the signs of the pivots of the scaled matrix."""
+def _check_definite(model: ElasticModel, key: str, matrix: Any, unit: str) -> None:
+    """Raise SceneError for negative eigenvalues beyond rounding, by the pivots of `matrix`."""
     if model.definite:
         return
     diagonal = matrix.diagonal()
@@ -143,7 +144,7 @@ def _definite(model: ElasticModel, key: str, matrix: Any, unit: str) -> None:
 
 
 def negative_pivots(matrix: Any, shift: float) -> int:
-    """Eigenvalues below -shift of the symmetric matrix scaled to a unit diagonal."""
+    """Number of eigenvalues below -shift of a symmetric matrix scaled to a unit diagonal."""
     from scipy import sparse
     from scipy.sparse.linalg import splu
 
@@ -156,18 +157,18 @@ def negative_pivots(matrix: Any, shift: float) -> int:
     return int(np.count_nonzero(lu.U.diagonal() < 0))
 
 
-def _equal_masses(model: ElasticModel) -> None:
+def _check_equal_masses(model: ElasticModel) -> None:
     block, mass = model.inertia[:3, :3], float(np.trace(model.inertia[:3, :3]) / 3)
     worst = float(np.max(np.abs(block - mass * np.eye(3))))
     if not mass > 0 or worst > RIGID * mass:
         values = ", ".join(f"{value:.6g}" for value in np.diag(block))
         raise model.refuse(
             f"mass: expected the same mass in kg along x, y and z, found {values}; check the order "
-            'of the unknowns ("node" or "component") and that no unknown was left out'
+            'of the unknowns ("node" or "component") and that no unknown is missing'
         )
 
 
-def _rigid_motions(model: ElasticModel) -> None:
+def _check_rigid_motions(model: ElasticModel) -> None:
     stiffness, motions = model.stiffness, model.rigid
     force = np.max(np.abs(stiffness @ motions), axis=0)
     terms = np.max(abs(stiffness) @ np.abs(motions), axis=0)
@@ -176,22 +177,22 @@ def _rigid_motions(model: ElasticModel) -> None:
     if share[worst] > RIGID:
         raise model.refuse(
             f"stiffness: expected no force in rigid-body motions, found {share[worst]:.2g} of the "
-            f"entries' own in a {_MOTIONS[worst]}: the model is held somewhere, or nodes and "
-            "unknowns are in different orders; give the matrices of the free body"
+            f"size of its terms in a {_RIGID_MOTIONS[worst]}: the model is constrained somewhere, "
+            "or nodes and unknowns are in different orders; give the matrices of the free body"
         )
 
 
-def _scalar_mass(model: ElasticModel) -> None:
+def _check_scalar_mass(model: ElasticModel) -> None:
     if model.scalar_mass is None:
         return
     if model.unknowns == 6:
         raise model.refuse(
-            "scalar_mass: expected with 3 unknowns per node, found 6, whose rotations have a mass "
-            "of their own; leave it out"
+            "scalar_mass: expected 3 unknowns per node, found 6, with rotations that have other "
+            "masses; leave it out"
         )
     largest = float(abs(model.scalar_mass).max())
-    one = model.mass[0::3][:, 0::3]
-    worst = float(abs(one - model.scalar_mass).max())
+    along_x = model.mass[0::3][:, 0::3]
+    worst = float(abs(along_x - model.scalar_mass).max())
     if worst > RIGID * largest:
         raise model.refuse(
             f"scalar_mass: expected the mass matrix of the unknowns along x, found entries that "

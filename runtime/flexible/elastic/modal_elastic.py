@@ -1,4 +1,4 @@
-"""General elastic bodies of a scene -> modal bodies: read, checked, reduced, integrated.
+"""Modal bodies of the [[elastic]] tables of a scene: read, checked, reduced, integrated.
 
 Floating-frame description with the shapes of a finite-element model (Rui, Wang, Zhang, section 8.2,
 (8.20) to (8.24)).
@@ -49,58 +49,60 @@ __all__ = [
 
 T = TypeVar("T")
 
-#: Fixed-interface modes where the scene leaves their number open.
+#: Number of vibration modes for modes = "auto".
 AUTO_MODES = 4
-#: Bodies whose numbers are kept.
+#: Number of cached bodies.
 KEPT = 8
-#: Unknowns, about, from which numbers are found by a process that can be interrupted: some tenths
-#: of a second of factorisation.
+#: Approximate number of unknowns from which a body is computed in a subprocess, which can be
+#: interrupted: some tenths of a second of factorisation.
 LONG = 6000
-#: Entries below this part of the largest of their kind are rounding, and become exact zeros.
+#: Entries below this share of the largest one are rounding, and are set to zero.
 _ROUNDING = 1e-10
 
 
 def elastic_bodies(scene: Scene) -> dict[str, ModalBody]:
-    """The modal body of every [[elastic]] table but those with model = "rigid", in the order of
-    the scene.
+    """Modal bodies by name of all [[elastic]] tables except those with model = "rigid".
 
-    Raises SceneError for files and matrices that describe no free elastic body and for ends off the
-    mesh, EnvironmentFailure where a mesh needs the extra `fem`.
+    Raises SceneError for files and matrices that do not describe a free elastic body and for ends
+    outside the mesh, EnvironmentFailure if a mesh needs the extra `fem`.
     """
     return {e.name: modal_body(e, scene) for e in scene.elastic if e.model != "rigid"}
 
 
 def modal_body(elastic: Elastic, scene: Scene) -> ModalBody:
-    """The modal body of one [[elastic]] table of a scene, whatever its model.
+    """Modal body of one [[elastic]] table of a scene, for any key `model`.
 
-    The last few are kept: a scene is compiled again for other parameters of other bodies.
+    The last few bodies are cached, because a scene is compiled again when other bodies change.
     """
-    holder = _holder(elastic.name, scene)
-    held = holder.outboard_end if holder is not None else next(iter(elastic.ends))
-    used = frozenset(_used(elastic.name, scene) | {held})
-    source, (frame, why) = _Source(elastic), _frame(elastic, holder, held)
-    free = _freedom(elastic.name, held, holder, scene)
-    body = _made(source, held, used, free, frame, why)
+    hinge = _inboard_hinge(elastic.name, scene)
+    held = hinge.outboard_end if hinge is not None else next(iter(elastic.ends))
+    loaded = frozenset(_loaded_ends(elastic.name, scene) | {held})
+    source, (frame, reason) = _ElasticSource(elastic), _frame_and_reason(elastic, hinge, held)
+    motions = _free_motions(elastic.name, held, hinge, scene)
+    body = _cached_body(source, held, loaded, motions, frame, reason)
     if elastic.frame != "auto" or frame == "mean" or _stays_definite(body, held, scene):
         return body
-    turns, support = _turns(body), Supports(scene).of(body.name)
-    natural = frame if is_definite_with_first_shape(body, held, support, turns) else ""
-    why = "mean, because the mass matrix stays definite there"
-    why += f", {natural} with fewer shapes" if natural else ""
-    return replace(_made(source, held, used, free, "mean", why), unmoved_frame=natural)
+    rotations, support = _port_rotations(body), Supports(scene).of(body.name)
+    fewer_suffice = is_definite_with_first_shape(body, held, support, rotations)
+    natural_frame = frame if fewer_suffice else ""
+    reason = "mean, because the mass matrix stays definite there"
+    reason += f", {natural_frame} with fewer shapes" if natural_frame else ""
+    body = _cached_body(source, held, loaded, motions, "mean", reason)
+    return replace(body, unmoved_frame=natural_frame)
 
 
 def _stays_definite(body: ModalBody, held: str, scene: Scene) -> bool:
-    return is_mass_definite(body, body.ports[held], Supports(scene).of(body.name), _turns(body))
+    support = Supports(scene).of(body.name)
+    return is_mass_definite(body, body.ports[held], support, _port_rotations(body))
 
 
-def _turns(body: ModalBody) -> Array:
-    """(ports, 3, n) rotations of the sections, per mode."""
-    return np.stack([one.theta for one in body.ports.values()])
+def _port_rotations(body: ModalBody) -> Array:
+    """Rotation vectors (ports, 3, n) of the sections per mode, rad."""
+    return np.stack([port.theta for port in body.ports.values()])
 
 
-class _Source:
-    """A table and the file it names, equal where both are the same."""
+class _ElasticSource:
+    """Cache key of an [[elastic]] table and its file: equal if both are equal."""
 
     def __init__(self, elastic: Elastic) -> None:
         self.elastic = elastic
@@ -110,32 +112,38 @@ class _Source:
         self._key = (elastic.model_dump_json(), str(path.absolute()), file)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Source) and self._key == other._key
+        return isinstance(other, _ElasticSource) and self._key == other._key
 
     def __hash__(self) -> int:
         return hash(self._key)
 
 
 @lru_cache(maxsize=KEPT)
-def _made(
-    source: _Source, held: str, used: frozenset[str], free: Freedom, frame: str, why: str
+def _cached_body(
+    source: _ElasticSource,
+    held: str,
+    loaded_ends: frozenset[str],
+    motions: FreeMotions,
+    frame: str,
+    reason: str,
 ) -> ModalBody:
     elastic = source.elastic
     where = f'elastic "{elastic.name}"'
     return checked_result(
-        where, lambda: _maybe_apart(_reduced, elastic, held, used, free, frame, why)
+        where,
+        lambda: _run_long_work(_reduced_body, elastic, held, loaded_ends, motions, frame, reason),
     )
 
 
-def _maybe_apart(work: Callable[..., T], elastic: Elastic, *arguments: Any) -> T:
-    """work(elastic, *arguments), by a process of its own where that may take long."""
-    if _unknowns(elastic) < LONG:
+def _run_long_work(work: Callable[..., T], elastic: Elastic, *arguments: Any) -> T:
+    """Return work(elastic, *arguments), computed in a subprocess if it may take long."""
+    if _estimated_unknowns(elastic) < LONG:
         return work(elastic, *arguments)
     return run_in_subprocess(f'elastic "{elastic.name}"', work, elastic, *arguments)
 
 
-def _unknowns(elastic: Elastic) -> float:
-    """Unknowns of a body, roughly and before anything is read or made."""
+def _estimated_unknowns(elastic: Elastic) -> float:
+    """Estimated number of unknowns of a body, before its data are read."""
     if elastic.box is not None:
         return 12.0 * prod(elastic.box.divisions)
     if elastic.arrays is not None:
@@ -144,71 +152,77 @@ def _unknowns(elastic: Elastic) -> float:
     return path.stat().st_size / 50 if path.is_file() else 0.0
 
 
-def _reduced(
-    elastic: Elastic, held: str, used: frozenset[str], free: Freedom, frame: str, why: str
+def _reduced_body(
+    elastic: Elastic,
+    held: str,
+    loaded_ends: frozenset[str],
+    motions: FreeMotions,
+    frame: str,
+    reason: str,
 ) -> ModalBody:
     model = elastic_model(elastic)
     ports = []
     for name, end in elastic.ends.items():
-        loaded = name in used if end.static_shapes is None else end.static_shapes
+        loaded = name in loaded_ends if end.static_shapes is None else end.static_shapes
         ports.append(select_port(model, name, end, loaded or name == held))
     modes = AUTO_MODES if elastic.modes is None else elastic.modes
-    notes = [f"frame: {why}"]
+    notes = [f"frame: {reason}"]
     if elastic.modes is None:
         notes.append(f"modes: {modes} vibration modes")
     return elastic_body(
-        elastic.name, model, ports, held, modes, frame, release=_release(elastic, held, free),
+        elastic.name, model, ports, held, modes, frame, release=_release(elastic, held, motions),
         highest=elastic.highest_frequency, stiffening=elastic.stiffening,
         damping=elastic.damping, start=elastic.initial, notes=notes,
     )  # fmt: skip
 
 
-#: (translation, rotation) per speed that a hinge leaves free, outboard axes, and whether something
-#: acts along it.
-Freedom = tuple[tuple[tuple[float, ...], bool], ...]
+#: (translation, rotation) per free speed of a hinge, outboard axes, and whether it is loaded.
+FreeMotions = tuple[tuple[tuple[float, ...], bool], ...]
 
 
-def _freedom(name: str, held: str, holder: Hinge | None, scene: Scene) -> Freedom:
-    """What the hinge of a body leaves free; nothing where that is not known or may change."""
+def _free_motions(name: str, held: str, hinge: Hinge | None, scene: Scene) -> FreeMotions:
+    """Free motions of the inboard hinge of a body; none if not known or changing."""
     released = {event.hinge for event in scene.event}
-    if holder is None or holder.lets_go or holder.name in released:
+    if hinge is None or hinge.lets_go or hinge.name in released:
         return ()
-    loaded = held in _used(name, scene, but=holder)
-    coupled = any(holder.name in one.parts for c in scene.coupling for one in c.names)
-    drive, motions = holder.drive or (), initial_motion_axes(holder) or ()
+    is_loaded = held in _loaded_ends(name, scene, excluded=hinge)
+    is_coupled = any(
+        hinge.name in quantity.parts for coupling in scene.coupling for quantity in coupling.names
+    )
+    drive, motions = hinge.drive or (), initial_motion_axes(hinge) or ()
     return tuple(
-        ((*translation, *rotation), loaded or coupled or _acts(holder.law.entry(k)))
+        ((*translation, *rotation), is_loaded or is_coupled or _has_effort(hinge.law.entry(k)))
         for k, (translation, rotation) in enumerate(motions)
         if k >= len(drive) or drive[k] is None
     )
 
 
-def _acts(law: LawEntry) -> bool:
-    """Whether a law ever gives an effort."""
+def _has_effort(law: LawEntry) -> bool:
+    """Whether a hinge law can give an effort."""
     numbers = law.stiffness, law.damping, law.inertia
     return any(numbers) or not law.effort.is_zero or law.friction.acts or law.limits.acts
 
 
-def _release(elastic: Elastic, held: str, free: Freedom) -> Release:
-    turn = np.array(from_orientation(elastic.ends[held].orientation))
-    twists = [(np.array(twist).reshape(2, 3) @ turn.T).reshape(6) for twist, _ in free]
-    loaded = [twist for twist, (_, acts) in zip(twists, free, strict=True) if acts]
-    return Release(*(np.array(some).reshape(-1, 6).T for some in (twists, loaded)))
+def _release(elastic: Elastic, held: str, motions: FreeMotions) -> Release:
+    rotation = np.array(from_orientation(elastic.ends[held].orientation))
+    twists = [(np.array(twist).reshape(2, 3) @ rotation.T).reshape(6) for twist, _ in motions]
+    loaded = [twist for twist, (_, acts) in zip(twists, motions, strict=True) if acts]
+    return Release(*(np.array(columns).reshape(-1, 6).T for columns in (twists, loaded)))
 
 
 def rigid_inertia_and_ends(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
-    """(6, 6) inertia about the origin and the ends of an [[elastic]] table, without any shapes."""
-    return _maybe_apart(_rigid, elastic)
+    """Spatial inertia (6, 6) about the origin, and ends by name, of an [[elastic]] table."""
+    return _run_long_work(_rigid_inertia_and_ends, elastic)
 
 
-def _rigid(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
+def _rigid_inertia_and_ends(elastic: Elastic) -> tuple[Array, dict[str, Port]]:
     model = elastic_model(elastic)
     ends = {name: select_port(model, name, end, False) for name, end in elastic.ends.items()}
     return model.inertia, ends
 
 
 def elastic_model(elastic: Elastic) -> ElasticModel:
-    """The checked matrices of an [[elastic]] table."""
+    """Checked finite-element model of an [[elastic]] table."""
     where = f'elastic "{elastic.name}"'
     if elastic.matrices is not None:
         path = Path(elastic.matrices)
@@ -234,39 +248,40 @@ def elastic_model(elastic: Elastic) -> ElasticModel:
     return check_matrices(mesh_model(mesh, material, elastic.order or 2, where, look))
 
 
-def _holder(name: str, scene: Scene) -> Hinge | None:
-    """The hinge that holds the body."""
+def _inboard_hinge(name: str, scene: Scene) -> Hinge | None:
+    """Inboard hinge of a body; None for a free body."""
     return inboard_hinges_by_body(scene).get(name)
 
 
-def _used(name: str, scene: Scene, but: Hinge | None = None) -> set[str]:
-    """Ends on which a hinge (`but` for one), a chain, a load, a spring or a constraint acts."""
+def _loaded_ends(name: str, scene: Scene, excluded: Hinge | None = None) -> set[str]:
+    """Ends of a body with a hinge (other than `excluded`), chain, load, spring or constraint."""
     references = [
-        reference for hinge in scene.hinge if hinge is not but
+        reference for hinge in scene.hinge if hinge is not excluded
         for reference in (hinge.inboard, hinge.outboard)
     ]  # fmt: skip
     references += [chain.inboard for chain in scene.chain] + [load.on for load in scene.load]
-    acting = (*scene.forces, *scene.constraint)
-    references += [reference for one in acting for reference in (one.from_, one.to)]
-    return {at for body, at in map(split_reference, references) if body == name and body != GROUND}
+    elements = (*scene.forces, *scene.constraint)
+    references += [reference for element in elements for reference in (element.from_, element.to)]
+    ends = map(split_reference, references)
+    return {end for body, end in ends if body == name and body != GROUND}
 
 
-def _frame(elastic: Elastic, holder: Hinge | None, held: str) -> tuple[str, str]:
-    """The frame and why: a hinge that leaves rotations free should not hold the frame's section."""
+def _frame_and_reason(elastic: Elastic, hinge: Hinge | None, held: str) -> tuple[str, str]:
+    """Kind of floating frame and the reason; mean for a hinge that leaves rotations free."""
     if elastic.frame != "auto":
         return elastic.frame, f"{elastic.frame}, as given"
-    if holder is not None and prescribes_rotation(holder):
-        return "tangent", f'tangent at "{held}", which hinge "{holder.name}" turns with it'
-    what = "no hinge holds it" if holder is None else f'hinge "{holder.name}" lets it turn freely'
-    return "mean", f"mean, because {what}"
+    if hinge is not None and prescribes_rotation(hinge):
+        return "tangent", f'tangent at "{held}", where hinge "{hinge.name}" fixes the rotation'
+    free = f'hinge "{hinge.name}" lets it rotate freely' if hinge is not None else "it has no hinge"
+    return "mean", f"mean, because {free}"
 
 
 def prescribes_rotation(hinge: Hinge) -> bool:
-    """True if the hinge prescribes every rotation of its outboard side for all time."""
+    """Whether a hinge prescribes all rotations of its outboard end at all times."""
     if hinge.facts is not None and not hinge.facts.turns:
         return not hinge.lets_go
-    driven = hinge.drive is not None and all(entry is not None for entry in hinge.drive)
-    return driven and not hinge.lets_go
+    is_driven = hinge.drive is not None and all(entry is not None for entry in hinge.drive)
+    return is_driven and not hinge.lets_go
 
 
 def elastic_body(
@@ -284,53 +299,54 @@ def elastic_body(
     notes: Sequence[str] = (),
     release: Release | None = None,
 ) -> ModalBody:
-    """The modal body of a checked model.
+    """Modal body of a checked finite-element model.
 
     Args:
-        ports: every end; `held` names the one that the inboard hinge holds.
-        modes: vibration modes besides six static shapes per loaded end but the held one.
-        release: what the inboard hinge leaves free at the held end; None for nothing.
+        ports: all ends; `held` is the name of that with the inboard hinge.
+        modes: number of vibration modes, besides six static shapes per loaded end except `held`.
+        release: free motions of the inboard hinge at the held end; None for none.
         frame: "tangent" (at the held end) or "mean".
         highest: shapes above this frequency in rad/s are left out.
-        stiffening: with the stiffness that stresses bring, where the model knows stresses.
+        stiffening: with geometric stiffness, if the model has stresses.
         damping: `.ratio` (one, or one per shape) and `.stiffness` (s), see the scene's table.
-        start: `.eta`, `.etad` (None: zeros); a static start is found by whoever knows the loads.
+        start: `.eta`, `.etad` (None: zeros); the caller computes a static start from the loads.
 
     Modal coordinates are in m; modal masses equal the body's mass, K and Mff are diagonal.
     """
     ports = list(ports)
     check_separate_nodes(model, ports)
-    holding = next(p for p in ports if p.name == held)
-    reduction = reduce(model, ports, holding, modes, frame, highest, release)
-    found = field_moments(model, reduction.shapes)
-    K = np.diag(found.mass * reduction.frequencies**2)
-    stiff = _stiffened(reduction, ports, stiffening)
+    held_port = next(p for p in ports if p.name == held)
+    reduction = reduce(model, ports, held_port, modes, frame, highest, release)
+    integrals = field_moments(model, reduction.shapes)
+    K = np.diag(integrals.mass * reduction.frequencies**2)
+    eta, etad = (_initial_state(model, start, key, len(K)) for key in ("eta", "etad"))
+    second_order = _second_order_terms(reduction, ports, stiffening)
     return ModalBody(
         name=name, modes=tuple(f"m{i + 1}" for i in range(len(K))),
-        mass=found.mass, first=found.first, second=found.second,
-        C=_clean(found.C), E=_clean(found.E), F=_clean(found.F),
-        G=_clean(stiff.G), X=_clean(stiff.X), K=K,
-        D=_damping(name, model, damping, K, found.mass, reduction.frequencies),
-        ports={p.name: _port(reduction, p, stiff.ends[p.name]) for p in ports},
-        eta=_start(model, start, "eta", len(K)), etad=_start(model, start, "etad", len(K)),
+        mass=integrals.mass, first=integrals.first, second=integrals.second,
+        C=_clean(integrals.C), E=_clean(integrals.E), F=_clean(integrals.F),
+        G=_clean(second_order.G), X=_clean(second_order.X), K=K,
+        D=_damping(name, model, damping, K, integrals.mass, reduction.frequencies),
+        ports={p.name: _port(reduction, p, second_order.ends[p.name]) for p in ports},
+        eta=eta, etad=etad,
         skin=skin(model, reduction.shapes),
-        frame=frame, notes=(*notes, *_notes(model, reduction, stiffening), found.how),
+        frame=frame, notes=(*notes, *_notes(model, reduction, stiffening), integrals.how),
         warnings=model.warnings, resolved=resolution(reduction, release),
         truncation=truncation(reduction, ports),
     )  # fmt: skip
 
 
-def _stiffened(reduction: Reduction, ports: list[Port], stiffening: bool) -> SecondOrder:
+def _second_order_terms(reduction: Reduction, ports: list[Port], stiffening: bool) -> SecondOrder:
     if stiffening:
         return second_order_moments(reduction, ports)
     n = reduction.shapes.shape[1]
-    none = {port.name: np.zeros((6, n, n)) for port in ports}
-    return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), none)
+    zeros = {port.name: np.zeros((6, n, n)) for port in ports}
+    return SecondOrder(np.zeros((3, n, n)), np.zeros((3, 3, n, n)), zeros)
 
 
 def _notes(model: ElasticModel, reduction: Reduction, stiffening: bool) -> list[str]:
     lowest, top = reduction.frequencies[0], reduction.frequencies[-1]
-    kind = "of the body as its hinge holds it" if reduction.released else "fixed-interface"
+    kind = "modes of the body with its hinge" if reduction.released else "fixed-interface modes"
     notes = [
         *model.notes,
         f"shapes: {reduction.static} static and {reduction.fixed} {kind}, orthogonal, "
@@ -339,7 +355,7 @@ def _notes(model: ElasticModel, reduction: Reduction, stiffening: bool) -> list[
     if len(reduction.left_out):
         notes.append(f"left out: {len(reduction.left_out)} shapes above {top:.6g} rad/s")
     if stiffening and model.stress is None:
-        notes.append("no geometric stiffening: mass and stiffness matrices do not hold it")
+        notes.append("no geometric stiffening: mass and stiffness matrices do not contain it")
     return notes
 
 
@@ -354,7 +370,7 @@ def _port(reduction: Reduction, port_: Port, second: Array) -> ModalPort:
 
 
 def _clean(values: Array) -> Array:
-    """Values with rounding replaced by exact zeros, so that code made of them folds."""
+    """Values with rounding errors set to zero, so that generated code becomes simpler."""
     largest = float(np.max(np.abs(values), initial=0.0))
     return np.where(np.abs(values) <= _ROUNDING * largest, 0.0, values)
 
@@ -362,7 +378,7 @@ def _clean(values: Array) -> Array:
 def _damping(
     name: str, model: ElasticModel, damping: Any, K: Array, mass: float, frequencies: Array
 ) -> Array:
-    """D = tau K + 2 zeta omega m."""
+    """Damping matrix D = tau K + 2 zeta omega m."""
     if damping is None:
         return np.zeros_like(K)
     ratios = np.asarray(damping.ratio, dtype=float)
@@ -373,7 +389,7 @@ def _damping(
     return np.asarray(damping.stiffness * K + np.diag(2 * ratios * frequencies * mass))
 
 
-def _start(model: ElasticModel, start: Any, key: str, n: int) -> Array:
+def _initial_state(model: ElasticModel, start: Any, key: str, n: int) -> Array:
     values = None if start is None else getattr(start, key)
     if values is None:
         return np.zeros(n)

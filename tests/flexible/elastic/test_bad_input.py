@@ -173,8 +173,8 @@ def odd_order(path: Path) -> None:
     ("write", "words"),
     [
         (None, "there is no file"),
-        (plain_file, "is no file of arrays"),
-        (one_array, "is no file of arrays"),
+        (plain_file, "is not a file of arrays"),
+        (one_array, "is not a file of arrays"),
         (without_nodes, "the array 'nodes' is missing"),
         (odd_key, "unknown array 'stifness'; did you mean \"stiffness\"?"),
         (half_sparse, "a sparse mass needs mass_data, mass_indices, mass_indptr"),
@@ -217,7 +217,7 @@ def test_sparse_parts_that_do_not_fit(tmp_path: Path, how: str) -> None:
     spoil(arrays)
     np.savez(path, **arrays)
     message = refusal(bar.from_arrays(matrices=str(path)))
-    assert words in message and "is no sparse matrix in row form" in message
+    assert words in message and "is not a sparse matrix in row form" in message
 
 
 def test_a_file_cut_off_anywhere(tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_a_file_cut_off_anywhere(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for length in range(0, len(whole), len(whole) // 40):
         path.write_bytes(whole[:length])
-        assert "is no file of arrays" in refusal(bar.from_arrays(matrices=str(path)))
+        assert "is not a file of arrays" in refusal(bar.from_arrays(matrices=str(path)))
 
 
 def test_a_file_with_changed_bytes(tmp_path: Path, rng: np.random.Generator) -> None:
@@ -250,7 +250,7 @@ def test_an_archive_whose_header_is_no_text(tmp_path: Path) -> None:
     np.save(header, np.ones(3))
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("mass.npy", header.getvalue().replace(b"'descr':", b"'descr'\x0f"))
-    with pytest.raises(SceneError, match="is no file of arrays"):
+    with pytest.raises(SceneError, match="is not a file of arrays"):
         bar.body(bar.from_arrays(matrices=str(path)))
 
 
@@ -262,7 +262,7 @@ def test_whatever_a_reader_makes_of_damage_is_refused(
 
     (tmp_path / "bar.npz").write_bytes(b"PK")
     monkeypatch.setattr(np, "load", stumble)
-    with pytest.raises(SceneError, match=r"is no file of arrays \(.npz\): LookupError"):
+    with pytest.raises(SceneError, match=r"is not a file of arrays \(.npz\): LookupError"):
         bar.body(bar.from_arrays(matrices=str(tmp_path / "bar.npz")))
 
 
@@ -272,9 +272,9 @@ FACE = [[0, -1, -1], [0, 1, 1]]
 @pytest.mark.parametrize(
     ("end", "words"),
     [
-        ({"plane": [1, 0, 0, 1.5]}, ["ends.tip: the plane holds no node", "0.5 m off"]),
-        ({"box": [[2, 0, 0], [3, 1, 1]]}, ["the box holds no node", "[1, ", "1 m off"]),
-        ({"sphere": [0, 0, 9, 0.1]}, ["the sphere holds no node"]),
+        ({"plane": [1, 0, 0, 1.5]}, ["ends.tip: the plane contains no node", "0.5 m away"]),
+        ({"box": [[2, 0, 0], [3, 1, 1]]}, ["the box contains no node", "[1, ", "1 m away"]),
+        ({"sphere": [0, 0, 9, 0.1]}, ["the sphere contains no node"]),
         ({"nodes": [7, 100000]}, ["nodes: expected numbers from 0 to", "found 100000"]),
         ({"nodes": [7]}, ["three or more nodes that do not lie on one line", "found 1"]),
         ({"box": [[0.8, -0.025, -0.01], [1, -0.025, -0.01]]}, ["found 3 on a line"]),
@@ -306,7 +306,7 @@ def test_shapes(changes: dict[str, Any], words: list[str]) -> None:
 def test_no_shape_at_all() -> None:
     ends = {"root": bar.ENDS["root"]}
     one = bar.table(box=bar.short(), ends=ends, modes=0)
-    with pytest.raises(SceneError, match=r"modes = 0 leaves no shape, .*write modes = 1"):
+    with pytest.raises(SceneError, match=r"modes = 0 leaves no shape, .*give modes = 1"):
         bar.body(one, load=[])
 
 

@@ -109,7 +109,7 @@ def test_frame_follows_the_hinge() -> None:
     assert bar.body(coarse).frame == "tangent"
     pinned = bar.body(coarse, "pin")
     assert pinned.frame == "mean"
-    assert 'hinge "held" lets it turn freely' in pinned.notes[0]
+    assert 'hinge "held" lets it rotate freely' in pinned.notes[0]
     assert bar.body(coarse | {"frame": "tangent"}, "pin").frame == "tangent"
 
 

@@ -26,7 +26,7 @@ def folders(tmp_path: Path) -> tuple[Path, Path]:
 
 
 def refused(path: Path) -> None:
-    with pytest.raises(SceneError, match="not in its own folder; put that file beside the mesh"):
+    with pytest.raises(SceneError, match="not in its own folder; put that file next to the mesh"):
         read_mesh(path, "body")
 
 
