@@ -1,4 +1,4 @@
-"""States of a model brought to where its loops are closed."""
+"""Assembly of a model: nearest states that satisfy all constraints."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..risk_checks.answers import find_state_risks
 
 
 class Assembly(AssessedAnswer, tuple[Array, Array]):
-    """(q, u) of a closed state, and how far it can be trusted."""
+    """Closed state (q, u) with findings about it."""
 
     findings: Iterable[Risk]
 
@@ -42,8 +42,8 @@ def assemble(
     t: float,
     branch: int | None = None,
 ) -> Assembly:
-    """See `Model.assemble`; speeds of the hinges `fast` stay, of all that have some if None."""
-    hold, hinges = _names(compiled, hold), compiled.layout.hinges
+    """Nearest closed state, see `Model.assemble`; hinges `fast` keep their speeds (None: all)."""
+    hold, hinges = _held_hinges(compiled, hold), compiled.layout.hinges
     if compiled.closed is None:
         return Assembly(compiled, t, q.copy(), u.copy())
     q, u = LoopCalls(compiled.looped, q, t=t).driven(q, u)
@@ -52,38 +52,38 @@ def assemble(
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
     ]  # fmt: skip
     if sum(hinges[name].nu for name in moving) > compiled.closed.loops.mobility:
-        moving = []  # a whole state: no more than its freedoms can be kept
+        moving = []  # a complete state: only as many speeds as the mobility can be kept
     fast = moving if fast is None else fast
     if branch is None:
-        found = compiled.closed.nearest(q, u, hold, fast, t)
+        state = compiled.closed.nearest(q, u, hold, fast, t)
     else:
-        there = compiled.closed.led(_on_branch(compiled.closed, branch), q, hold, t)
-        found = compiled.closed.assembled(there, u, hold, fast, t)
-    return Assembly(compiled, t, *found)
+        start = compiled.closed.led(_branch_coordinates(compiled.closed, branch), q, hold, t)
+        state = compiled.closed.assembled(start, u, hold, fast, t)
+    return Assembly(compiled, t, *state)
 
 
 def assemble_path(compiled: CompiledScene, q: Array, hold: Sequence[str], branch: int) -> Array:
-    """See `Model.assemble_path`."""
-    hold = _names(compiled, hold)
+    """Closed states along a path of held coordinates; see `Model.assemble_path`."""
+    hold = _held_hinges(compiled, hold)
     if compiled.closed is None:
         return q.copy()
-    here, found = _on_branch(compiled.closed, branch), np.empty_like(q)
+    state, states = _branch_coordinates(compiled.closed, branch), np.empty_like(q)
     for k, row in enumerate(q):
-        to = LoopCalls(compiled.looped, row).driven(row, np.zeros(compiled.nu))[0]
-        found[k] = here = compiled.closed.led(here, to, hold)
-    return found
+        target = LoopCalls(compiled.looped, row).driven(row, np.zeros(compiled.nu))[0]
+        states[k] = state = compiled.closed.led(state, target, hold)
+    return states
 
 
-def _on_branch(closed: LoopStart, number: int) -> Array:
-    """q (nq,) of a branch by its number."""
+def _branch_coordinates(closed: LoopStart, number: int) -> Array:
+    """Coordinates q (nq,) of the branch with a given number."""
     count = len(closed.branches)
     if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < count:
         raise SceneError(f"branch = {number!r:.60}: expected 0 to {count - 1}, see loops.branches")
     return closed.branches[number].q
 
 
-def _names(compiled: CompiledScene, hold: Sequence[str]) -> list[str]:
-    """Names of hinges that are held; SceneError for what names none."""
+def _held_hinges(compiled: CompiledScene, hold: Sequence[str]) -> list[str]:
+    """Names of the hinges in `hold`; raises SceneError for anything else."""
     hinges, modal = compiled.layout.hinges, compiled.layout.modal
     if isinstance(hold, str) or not isinstance(hold, Collection):
         raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")

@@ -1,8 +1,7 @@
-"""Inverse dynamics and mass matrix of mechanisms: what their tree asks for, along the motions that
-loops leave.
+"""Inverse dynamics and mass matrix of mechanisms with closed loops.
 
-With N of `IndependentSpeeds`, u = N v, loads of rows do no work along N: N^T R = N^T tau, where R
-are the efforts that the tree would need for the accelerations if its loops were open.
+With u = N v of `IndependentSpeeds`, constraint loads do no work along N: N^T R = N^T tau, where R
+are the efforts that the open tree would need for the accelerations.
 """
 
 from __future__ import annotations
@@ -20,18 +19,18 @@ from ..engine.loops.independent_speeds import IndependentSpeeds
 from ..linear.input_channels import channel, names_of
 from ..packing.coordinate_layout import refuse_dense
 
-#: Accelerations that tear a loop, in parts of those that there are.
-_TORN = 1e-6
-#: Actuators are none that a motion moves by less than this, in parts of what it moves most.
-_WEAK = 1e-7
+#: Largest deviation of given accelerations from closed loops, relative to the largest one.
+_MAX_OPENING = 1e-6
+#: Smallest motion of an actuator, relative to the largest, for which it can drive the motion.
+_MIN_SHARE = 1e-7
 
 
 def reduced_mass(model: CompiledScene, q: Array) -> Array:
-    """N^T M N (n, n) of the independent speeds at q (nq,)."""
+    """Mass matrix N^T M N (n, n) of the independent speeds at q (nq,)."""
     assert model.freedom is not None
     refuse_dense(len(model.freedom.places), "the mass matrix")
-    ways = model.freedom.following(q, model.freedom.places)
-    matrix = model.looped.required_by_inertia(q, ways.T) @ ways
+    motions = model.freedom.following(q, model.freedom.places)
+    matrix = model.looped.required_by_inertia(q, motions.T) @ motions
     return np.asarray((matrix + matrix.T) / 2)
 
 
@@ -43,11 +42,11 @@ def constrained_inverse_dynamics(
     t: ArrayLike,
     actuators: Sequence[str] | None,
 ) -> Array:
-    """Efforts (..., nu); see `Model.inverse_dynamics`."""
+    """Efforts (..., nu) of a mechanism; see `Model.inverse_dynamics`."""
     assert model.freedom is not None
     nu, places = model.nu, model.freedom.places
-    acting = list(places) if actuators is None else _acting(model, actuators)
-    few = np.ndim(udot) > 0 and np.shape(udot)[-1] == len(places) != nu
+    actuator_speeds = list(places) if actuators is None else _actuator_speeds(model, actuators)
+    is_reduced = np.ndim(udot) > 0 and np.shape(udot)[-1] == len(places) != nu
     if np.ndim(udot) > 0 and np.shape(udot)[-1] not in (nu, len(places)):
         raise SceneError(
             f"udot has shape {np.shape(udot)}, expected (..., {len(places)}) of the independent "
@@ -55,91 +54,92 @@ def constrained_inverse_dynamics(
         )
     lead, (times, coordinates, speeds, rates) = batch(
         ("t", t, None), ("q", q, model.nq), ("u", u, nu),
-        ("udot", udot, len(places) if few else nu),
+        ("udot", udot, len(places) if is_reduced else nu),
     )  # fmt: skip
     rows = [
-        _efforts(model, float(at), a, b, c, acting)
-        for at, a, b, c in zip(times, coordinates, speeds, rates, strict=True)
+        _efforts(model, float(time), a, b, c, actuator_speeds)
+        for time, a, b, c in zip(times, coordinates, speeds, rates, strict=True)
     ]
     return np.array(rows).reshape(*lead, nu)
 
 
-def _acting(model: CompiledScene, names: Sequence[str]) -> list[int]:
-    """Places of the speeds of actuators; SceneError unless they are as many as the motions."""
-    found = list[int]()
+def _actuator_speeds(model: CompiledScene, names: Sequence[str]) -> list[int]:
+    """Indices of the actuated speeds; raises SceneError unless their number is the mobility."""
+    speeds = list[int]()
     for name in names_of("actuators", names):
         slots = model.layout.hinges.get(name)
         if slots is not None:
-            own = range(slots.u, slots.u + slots.nu)
-            found += [speed for speed in own if speed in model.free_speeds]
+            hinge_speeds = range(slots.u, slots.u + slots.nu)
+            speeds += [speed for speed in hinge_speeds if speed in model.free_speeds]
         else:
-            found.append(_of_effort(model, name))
-    count, wanted = len(set(found)), len(model.freedom.places) if model.freedom else 0
-    if count != wanted:
+            speeds.append(_effort_speed(model, name))
+    count, mobility = len(set(speeds)), len(model.freedom.places) if model.freedom else 0
+    if count != mobility:
         raise SceneError(
-            f"actuators: {count} speeds act, the mechanism has {wanted} left free; name as "
-            f"many, such as hinges of {', '.join(model.layout.u_name(k) for k in _places(model))}"
+            f"actuators: expected as many speeds as the mobility of the mechanism, {mobility}, "
+            f"found {count}; name, for example, the hinges of {_independent_names(model)}"
         )
-    return sorted(set(found))
+    return sorted(set(speeds))
 
 
-def _places(model: CompiledScene) -> tuple[int, ...]:
-    return model.freedom.places if model.freedom else ()
+def _independent_names(model: CompiledScene) -> str:
+    places = model.freedom.places if model.freedom else ()
+    return ", ".join(map(model.layout.u_name, places))
 
 
-def _of_effort(model: CompiledScene, name: str) -> int:
-    one = channel(model, name)
-    if one.speed < 0:
+def _effort_speed(model: CompiledScene, name: str) -> int:
+    effort = channel(model, name)
+    if effort.speed < 0:
         raise SceneError(
             f'actuators: "{name}": expected a hinge, or an effort of one such as "shoulder.effort"'
         )
-    return one.speed
+    return effort.speed
 
 
 def _efforts(
-    model: CompiledScene, t: float, q: Array, u: Array, rates: Array, acting: list[int]
+    model: CompiledScene, t: float, q: Array, u: Array, rates: Array, actuator_speeds: list[int]
 ) -> Array:
-    """Efforts (nu,) at one state."""
+    """Efforts (nu,) of a mechanism at one state."""
     engine, freedom = model.looped, model.freedom
     assert freedom is not None
     places, memory = list(freedom.places), engine.start_memory()
-    ways = freedom.following(q, places)
-    forced = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None])[1][0]
-    wanted = rates if len(rates) == len(places) else rates[places]
-    a = forced + ways @ (wanted - forced[places])
+    motions = freedom.following(q, places)
+    free_rates = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None])[1][0]
+    target = rates if len(rates) == len(places) else rates[places]
+    a = free_rates + motions @ (target - free_rates[places])
     if len(rates) != len(places):
-        _refuse_torn(model, rates, a)
-    needed = engine.inverse_dynamics(t, q, u, a, memory)
-    if not _all_ways(freedom, ways, acting):
-        names = ", ".join(model.layout.u_name(k) for k in acting)
+        _check_closed(model, rates, a)
+    tree_efforts = engine.inverse_dynamics(t, q, u, a, memory)
+    if not _moves_all(freedom, motions, actuator_speeds):
+        names = ", ".join(model.layout.u_name(k) for k in actuator_speeds)
         raise NumericalFailure(
-            f"actuators: at this state efforts along {names} do not move the mechanism all ways; "
-            "name others, or take another state"
+            f"actuators: at this state efforts along {names} cannot drive all motions of the "
+            "mechanism; name other actuators, or use another state"
         )
     efforts = np.zeros(engine.nu)
-    efforts[acting] = np.linalg.solve(ways[acting].T, ways.T @ needed)
+    efforts[actuator_speeds] = np.linalg.solve(motions[actuator_speeds].T, motions.T @ tree_efforts)
     for speed in sorted({*range(engine.nu)} - {*model.free_speeds}):
-        efforts[speed] = freedom.driving(q, speed) @ (needed - efforts)
+        efforts[speed] = freedom.driving(q, speed) @ (tree_efforts - efforts)
     return efforts
 
 
-def _all_ways(freedom: IndependentSpeeds, ways: Array, acting: list[int]) -> bool:
-    """Whether efforts along some speeds move a mechanism all ways, lengths beside turns."""
-    sizes = freedom.sizes
-    scaled = ways * sizes[list(freedom.places)] / sizes[:, None]
-    least = np.linalg.svd(scaled[acting], compute_uv=False).min(initial=np.inf)
-    return bool(least > _WEAK * np.abs(scaled).max(initial=0.0))
+def _moves_all(freedom: IndependentSpeeds, motions: Array, actuator_speeds: list[int]) -> bool:
+    """Whether efforts along the actuated speeds can drive all motions of a mechanism."""
+    scales = freedom.sizes
+    scaled = motions * scales[list(freedom.places)] / scales[:, None]
+    smallest = np.linalg.svd(scaled[actuator_speeds], compute_uv=False).min(initial=np.inf)
+    return bool(smallest > _MIN_SHARE * np.abs(scaled).max(initial=0.0))
 
 
-def _refuse_torn(model: CompiledScene, given: Array, closed: Array) -> None:
-    """SceneError for accelerations that no motion of the mechanism has."""
+def _check_closed(model: CompiledScene, given: Array, closed: Array) -> None:
+    """Raise SceneError for accelerations that open the loops."""
     free = list(model.free_speeds)
-    apart = np.abs(given - closed)[free]
+    differences = np.abs(given - closed)[free]
     scale = max(1.0, float(np.abs(given[free]).max(initial=0.0)), float(np.abs(closed).max()))
-    if apart.max(initial=0.0) > _TORN * scale:
-        k = free[int(apart.argmax())]
+    if differences.max(initial=0.0) > _MAX_OPENING * scale:
+        k = free[int(differences.argmax())]
         raise SceneError(
-            f"udot of {model.layout.u_name(k)} is {given[k]:.6g}, where the loops go on closed "
-            f"with {closed[k]:.6g}; give the accelerations of the independent speeds alone: "
-            f"{', '.join(model.layout.u_name(j) for j in _places(model))}"
+            f"udot of {model.layout.u_name(k)} is {given[k]:.6g}, where closed loops need "
+            f"{closed[k]:.6g}; give the accelerations of the independent speeds alone: "
+            f"{_independent_names(model)}"
         )

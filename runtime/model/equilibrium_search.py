@@ -1,4 +1,4 @@
-"""The way of a model to static equilibrium: by sweeps, or by a stiffness matrix of differences."""
+"""Search for static equilibrium: by Riccati sweeps, or by a finite-difference stiffness."""
 
 from __future__ import annotations
 
@@ -31,34 +31,34 @@ from ..run.static_start.closed_states import ClosedStates
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
 
-#: Free speeds of trees, and of mechanisms, up to which a stiffness matrix by differences is made
-#: where the sweep finds no rest.
-_DENSE, _DENSE_LOOPS = 20, 6
-#: Of mechanisms with more speeds left than these, those that decide all others are not looked for.
-DECIDING = 200
-#: Efforts along motions of loops that are rounding, in parts of the work of all that cancel.
-_CANCELLED = 1e-14
-#: Steps beside light rotors before heavy ones are tried.
-_PATIENCE = 100
-#: How often a saddle is left, and how far, in sizes of the coordinates.
-_LEFT, _ASIDE = 20, 0.05
-#: How far beside a singular state work is looked at, in sizes, how many times further loops may
-#: lead, and along how many motions drawn.
-_NEAR, _FAR, _BESIDE = 0.02, 10.0, 6
+#: Largest number of free speeds of trees, and of mechanisms, for which a stiffness matrix by finite
+#: differences is used if the sweep finds no equilibrium.
+_MAX_DENSE, _MAX_DENSE_LOOPS = 20, 6
+#: Largest mobility of a mechanism whose independent speeds are determined.
+MAX_INDEPENDENT = 200
+#: Efforts along motions of loops that are rounding, relative to the work of all that cancel.
+_CANCELLATION = 1e-14
+#: Number of steps with light rotors before heavy ones are tried.
+_LIGHT_STEPS = 100
+#: Largest number of saddles that are left, and the step off them, in characteristic scales.
+_MAX_SADDLES, _SADDLE_STEP = 20, 0.05
+#: Test step near a singular state, in characteristic scales, the largest growth of the step by
+#: closing the loops, and the number of random directions.
+_TEST_STEP, _MAX_STEP_GROWTH, _RANDOM_COUNT = 0.02, 10.0, 6
 
-#: How far states of closed loops are at which loads are compared, in sizes.
-_FARTHEST_OF_LOOPS = 5.0
+#: Distance of closed states at which loads are compared, in characteristic scales.
+_FARTHEST_LOOP_STATE = 5.0
 
-#: Called with the number of every step and how long it is, in sizes of the coordinates.
+#: Called with the number and the length of every step, in characteristic scales.
 Progress = Callable[[int, float], None]
 
 
-class _Sweeps:
-    """Searches beside rotors of one weight, in parts of the scene's, on all hinges."""
+class _SweepSearch:
+    """Search by sweeps with rotors on all hinges, of a weight relative to the mass of the scene."""
 
     def __init__(self, model: CompiledScene, t: float, weight: float) -> None:
         engine = _with_rotors(model, weight)
-        self._scene = SceneSystem(engine, with_power=False)  # lays out tapes that need room
+        self._scene = SceneSystem(engine, with_power=False)  # allocates the tapes
         self.stiffness = ShiftedStiffness(TangentMatrix(engine), t, speed_scales(model))
         gravity = float(np.linalg.norm(model.scene.gravity))
         self._load = total_mass(model) * gravity * scene_length(model)
@@ -66,12 +66,12 @@ class _Sweeps:
     def find(
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, bool]:
-        """q at rest, and whether any steps led there."""
+        """Equilibrium q, and whether any steps were needed."""
         sweep = RestBySweep(self.stiffness, self.settled, self._load, max_steps, progress)
         return sweep.find(q, tolerance), sweep.steps > 0
 
     def settled(self, q: Array) -> Array:
-        """The state nearby with drives, quaternions and loops in order."""
+        """Nearby state with consistent drives, quaternions and loops."""
         try:
             return self._scene.start(self.stiffness.t, q, self.stiffness.still)[: len(q)]
         except SceneError as error:
@@ -79,34 +79,36 @@ class _Sweeps:
 
 
 class EquilibriumSearch:
-    """The way of one model to rest at time t: by sweeps, and of few coordinates, where those find
-    none, by a stiffness matrix of differences and with the load in parts."""
+    """Search for the equilibrium of one model at time t (s).
+
+    By sweeps; for few coordinates, if these fail, by a finite-difference stiffness and load steps.
+    """
 
     def __init__(self, model: CompiledScene, t: float) -> None:
         self._model, self._t = model, t
-        few = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
-        self._is_driven = few == 0  # drives and loops alone say where everything is
-        self._is_decided = few <= DECIDING
-        self._is_small = few <= (_DENSE if model.freedom is None else _DENSE_LOOPS)
-        self._sweeps: _Sweeps | None = None
+        mobility = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
+        self._is_driven = mobility == 0  # drives and loops alone determine the state
+        self._has_few_independent = mobility <= MAX_INDEPENDENT
+        self._is_small = mobility <= (_MAX_DENSE if model.freedom is None else _MAX_DENSE_LOOPS)
+        self._light_search: _SweepSearch | None = None
         try:
-            self._sweeps = _Sweeps(model, t, 1.0)
-        except SceneError:  # elements of before there were derivatives
+            self._light_search = _SweepSearch(model, t, 1.0)
+        except SceneError:  # old elements without derivatives
             if not self._is_small:
                 raise
-        self._by_differences: Rest | None = None
+        self._difference_problem: Rest | None = None
 
     def find(
         self, q: Array, tolerance: float, max_steps: int, progress: Progress | None
     ) -> tuple[Array, Stability]:
-        """q at rest, and its stability; saddles that were found on the way are left again."""
+        """Equilibrium q and its stability; saddles reached by steps are left again."""
         if self._is_driven:
             return q, Stability()
-        if self._sweeps is None:
+        if self._light_search is None:
             return self._find_by_differences(q, tolerance)
-        asked = tolerance, max_steps, _counted(progress)
+        limits = tolerance, max_steps, _count_steps(progress)
         try:
-            found, moved = self._swept(self._sweeps, q, *asked)
+            rest, has_moved = self._find_by_sweeps(self._light_search, q, *limits)
         except NumericalFailure as failure:
             if not self._is_small or self.find_unbalanced(q) is not None:
                 raise
@@ -114,121 +116,143 @@ class EquilibriumSearch:
                 return self._find_by_differences(q, tolerance)
             except NumericalFailure:
                 raise failure from None
-        stability = find_stability(self._sweeps.stiffness, found)
-        for _ in range(_LEFT if moved else 0):
+        stability = find_stability(self._light_search.stiffness, rest)
+        for _ in range(_MAX_SADDLES if has_moved else 0):
             if not stability.unstable:
                 break
-            beside = self._beside(self._sweeps.stiffness, found, stability.unstable)
+            start = self._off_saddle(self._light_search.stiffness, rest, stability.unstable)
             try:
-                found, _ = self._swept(self._sweeps, beside, *asked)
+                rest, _ = self._find_by_sweeps(self._light_search, start, *limits)
             except NumericalFailure:
                 break
-            stability = find_stability(self._sweeps.stiffness, found)
-        if stability.unstable and self._holds_singular(self._sweeps, found, stability.unstable):
+            stability = find_stability(self._light_search.stiffness, rest)
+        if stability.unstable and self._resists_near_singularity(
+            self._light_search, rest, stability.unstable
+        ):
             stability = Stability([], stability.neutral)
-        return found, stability
+        return rest, stability
 
-    def _holds_singular(self, sweeps: _Sweeps, q: Array, motions: list[Array]) -> bool:
-        """Whether states beside q, along motions (nu,) of negative stiffness, all take work where
-        loops have more motions than elsewhere: loads that loops take, and with them the stiffness,
-        are not determined there."""
-        model, freedom, stiffness = self._model, self._model.freedom, sweeps.stiffness
-        straight = _straight_places(model, list(range(model.nu)))
-        if freedom is None or model.closed is None or straight is None or not self._is_decided:
+    def _resists_near_singularity(
+        self, search: _SweepSearch, q: Array, motions: list[Array]
+    ) -> bool:
+        """Whether all states near a singular q, along motions (nu,), need work to be reached.
+
+        At a singular configuration the loop loads, and with them the stiffness, are indeterminate,
+        so that a negative stiffness along `motions` proves no instability.
+        """
+        model, freedom, stiffness = self._model, self._model.freedom, search.stiffness
+        coordinates = _coordinates_of_speeds(model, list(range(model.nu)))
+        if (
+            freedom is None
+            or model.closed is None
+            or coordinates is None
+            or not self._has_few_independent
+        ):
             return False
         if len(freedom.chosen(q)) <= model.closed.loops.mobility:
             return False
-        parts = np.random.default_rng(0).uniform(-1.0, 1.0, (_BESIDE, len(motions)))
-        held, ways = list[bool](), [*motions, *(parts @ np.array(motions))]
-        for way in [*ways, *(-one for one in ways)]:
+        weights = np.random.default_rng(0).uniform(-1.0, 1.0, (_RANDOM_COUNT, len(motions)))
+        resists, directions = list[bool](), [*motions, *(weights @ np.array(motions))]
+        for direction in [*directions, *map(np.negative, directions)]:
             efforts = stiffness.residual(q)
-            step = stiffness.tangent.coordinates(_NEAR / stiffness.length(way) * way)
+            increment = _TEST_STEP / stiffness.length(direction) * direction
+            step = stiffness.tangent.coordinates(increment)
             try:
-                beside = sweeps.settled(q + step)
+                nearby = search.settled(q + step)
             except NumericalFailure:
                 continue
-            gone = (beside - q)[straight]
-            if stiffness.length(gone) < _FAR * _NEAR:
-                held.append(float((efforts + stiffness.residual(beside)) @ gone) > 0)
+            change = (nearby - q)[coordinates]
+            if stiffness.length(change) < _MAX_STEP_GROWTH * _TEST_STEP:
+                resists.append(float((efforts + stiffness.residual(nearby)) @ change) > 0)
         stiffness.residual(q)
-        return bool(held) and all(held)
+        return bool(resists) and all(resists)
 
-    def _swept(
-        self, light: _Sweeps, q: Array, tolerance: float, max_steps: int, progress: Progress | None
+    def _find_by_sweeps(
+        self,
+        light: _SweepSearch,
+        q: Array,
+        tolerance: float,
+        max_steps: int,
+        progress: Progress | None,
     ) -> tuple[Array, bool]:
-        """q at rest, and whether any steps led there: of many coordinates, where that takes long,
-        beside heavy rotors first."""
-        model, first = self._model, max_steps if self._is_small else min(max_steps, _PATIENCE)
+        """Equilibrium q, and whether any steps were needed.
+
+        With many coordinates a slow search is repeated with heavy rotors first.
+        """
+        model = self._model
+        first_steps = max_steps if self._is_small else min(max_steps, _LIGHT_STEPS)
         try:
-            return light.find(q, tolerance, first, progress)
+            return light.find(q, tolerance, first_steps, progress)
         except Unsettled:
-            if first == max_steps:
+            if first_steps == max_steps:
                 raise
-        left = max_steps - first
+        remaining = max_steps - first_steps
         try:
-            heavy = _Sweeps(model, self._t, float(len(model.free_speeds)))
-            near, _ = heavy.find(q, tolerance, left, progress)
-            return light.find(near, tolerance, left, progress)[0], True
+            heavy = _SweepSearch(model, self._t, float(len(model.free_speeds)))
+            rest, _ = heavy.find(q, tolerance, remaining, progress)
+            return light.find(rest, tolerance, remaining, progress)[0], True
         except NumericalFailure:
             pass
         try:
-            return light.find(q, tolerance, left, progress)
+            return light.find(q, tolerance, remaining, progress)
         except Unsettled as failure:
             raise Unsettled(f"not at rest after {max_steps} steps", failure.residual) from None
 
     @staticmethod
-    def _beside(stiffness: ShiftedStiffness, q: Array, motions: list[Array]) -> Array:
-        """q a little way along all of some motions (nu,)."""
-        aside = np.zeros_like(motions[0])
-        for one in motions:
-            aside += one / one[np.abs(one / stiffness.sizes).argmax()]
-        step = _ASIDE / stiffness.length(aside) * aside
+    def _off_saddle(stiffness: ShiftedStiffness, q: Array, motions: list[Array]) -> Array:
+        """q after a small step along the sum of some motions (nu,)."""
+        direction = np.zeros_like(motions[0])
+        for motion in motions:
+            direction += motion / motion[np.abs(motion / stiffness.sizes).argmax()]
+        step = _SADDLE_STEP / stiffness.length(direction) * direction
         return np.asarray(q + stiffness.tangent.rates(q, step))
 
     def _find_by_differences(self, q: Array, tolerance: float) -> tuple[Array, Stability]:
         model = self._model
         if model.freedom is not None:
-            problem = _of_mechanism(model, model.freedom, q, self._t)
+            problem = _mechanism_problem(model, model.freedom, q, self._t)
         else:
-            problem = _problem(model, self._t, list(model.free_speeds))
-        found = approached(problem, q, tolerance)
-        self._by_differences = problem = problem.at(found)
+            problem = _tree_problem(model, self._t, list(model.free_speeds))
+        rest = approached(problem, q, tolerance)
+        self._difference_problem = problem = problem.at(rest)
         units = np.eye(model.nu)
-        return found, Stability(
-            [units[problem.places[k]] for k in unstable_coordinates(problem, found)]
+        return rest, Stability(
+            [units[problem.places[k]] for k in unstable_coordinates(problem, rest)]
         )
 
     def find_unbalanced(self, q: Array) -> tuple[Array, Array, int] | None:
-        """A motion (nu,) along which loads do the same work at every state drawn, the loads (nu,)
-        at q, and the number of states; None where there is no such motion."""
+        """Motion (nu,) along which loads do the same work at all random states, if there is one.
+
+        Returns the motion, the loads (nu,) at q and the number of states; else None.
+        """
         model, freedom = self._model, self._model.freedom
-        if self._is_driven or not self._is_decided:
+        if self._is_driven or not self._has_few_independent:
             return None
-        still = np.zeros(model.nu)
+        zeros = np.zeros(model.nu)
         try:
             if freedom is None:
-                problem = _problem(model, self._t, list(model.free_speeds))
+                problem = _tree_problem(model, self._t, list(model.free_speeds))
             else:
-                problem = _of_mechanism(model, freedom, q, self._t)
-            problem = replace(problem, needed=self._with_axes(problem))
-            farthest = FARTHEST if freedom is None else _FARTHEST_OF_LOOPS
-            found = find_unbalanced_motion(problem, q, farthest)
-            if found is None:
+                problem = _mechanism_problem(model, freedom, q, self._t)
+            problem = replace(problem, needed=self._efforts_in_inboard_axes(problem))
+            farthest = FARTHEST if freedom is None else _FARTHEST_LOOP_STATE
+            unbalanced = find_unbalanced_motion(problem, q, farthest)
+            if unbalanced is None:
                 return None
-            motion = still.copy()
-            motion[list(problem.places)] = found[0]
+            motion = zeros.copy()
+            motion[list(problem.places)] = unbalanced[0]
             for places, axes in self._axes_of_free_hinges(q):
                 motion[places] = axes.T @ motion[places]
             if freedom is not None:
-                motion = freedom.following(q, problem.places) @ found[0]
+                motion = freedom.following(q, problem.places) @ unbalanced[0]
         except (NumericalFailure, SceneError):
             return None
         engine = model.looped
-        efforts = engine.inverse_dynamics(self._t, q, still, still, engine.start_memory())
-        return motion, -np.asarray(efforts), found[1]
+        efforts = engine.inverse_dynamics(self._t, q, zeros, zeros, engine.start_memory())
+        return motion, -np.asarray(efforts), unbalanced[1]
 
-    def _with_axes(self, problem: Rest) -> Callable[[Array], Array]:
-        """Efforts of a problem with forces on free hinges in the axes of their inboard sides."""
+    def _efforts_in_inboard_axes(self, problem: Rest) -> Callable[[Array], Array]:
+        """Function of the efforts, with forces on free hinges in the axes of their inboard ends."""
 
         def needed(q: Array) -> Array:
             efforts = np.zeros(self._model.nu)
@@ -240,7 +264,7 @@ class EquilibriumSearch:
         return needed
 
     def _axes_of_free_hinges(self, q: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
-        """Of each free hinge of a tree the places of its velocity and its axes (3, 3) at q."""
+        """Indices of the velocity, and axes (3, 3) at q, of each free hinge of a tree."""
         model, engine, units = self._model, self._model.looped, np.eye(self._model.nu)
         for slots in model.layout.hinges.values() if model.freedom is None else ():
             places = np.arange(slots.nu)[:3] + slots.u_slice.start
@@ -249,18 +273,18 @@ class EquilibriumSearch:
                 yield places, np.array(rates)[:, slots.q : slots.q + 3].T
 
     def residuals(self, q: Array) -> dict[str, float]:
-        """Efforts that are missing at a rest, by the names of speeds."""
+        """Remaining efforts at an equilibrium by the names of speeds."""
         model, freedom = self._model, self._model.freedom
         if self._is_driven:
             return {}
-        if self._sweeps is None or self._by_differences is not None:
-            assert self._by_differences is not None
-            places, efforts = self._by_differences.places, self._by_differences.needed(q)
+        if self._light_search is None or self._difference_problem is not None:
+            assert self._difference_problem is not None
+            places, efforts = self._difference_problem.places, self._difference_problem.needed(q)
             return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
-        stiffness = self._sweeps.stiffness
-        if freedom is None or not self._is_decided:
-            own, missing = set(stiffness.own.tolist()), stiffness.residual(q)
-            places = tuple(j for j in model.free_speeds if j not in own)
+        stiffness = self._light_search.stiffness
+        if freedom is None or not self._has_few_independent:
+            cut_speeds, missing = set(stiffness.own.tolist()), stiffness.residual(q)
+            places = tuple(j for j in model.free_speeds if j not in cut_speeds)
             efforts = missing[list(places)]
         else:
             places = freedom.chosen(q)
@@ -268,34 +292,34 @@ class EquilibriumSearch:
         return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
 
 
-def _counted(progress: Progress | None) -> Progress | None:
-    """The same with steps counted over several searches."""
+def _count_steps(progress: Progress | None) -> Progress | None:
+    """Progress callback that counts steps over several searches."""
     steps = itertools.count()
     return None if progress is None else lambda _, length: progress(next(steps), length)
 
 
 def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
-    """The engine of the model with rotors on all hinges, as heavy as so many scenes."""
+    """Engine of the model with rotors on all hinges, of `weight` times the mass of the scene."""
     packed = model.packed
     rotors = weight * (total_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
     engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
     if model.closed is not None:
-        LoopCalls(engine, model.closed.start[0])  # judges its rows
+        LoopCalls(engine, model.closed.start[0])  # determines its redundant rows
     return engine
 
 
-def _problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
-    engine, still = model.looped, np.zeros(model.nu)
+def _tree_problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
+    engine, zeros = model.looped, np.zeros(model.nu)
     memory, quaternions = engine.start_memory(), model.layout.quaternions
-    straight = _straight_places(model, free)
+    coordinates = _coordinates_of_speeds(model, free)
 
     def needed(q: Array) -> Array:
-        return np.asarray(engine.inverse_dynamics(t, q, still, still, memory)[free])
+        return np.asarray(engine.inverse_dynamics(t, q, zeros, zeros, memory)[free])
 
     def moved(q: Array, increment: Array) -> Array:
-        if straight is not None:
+        if coordinates is not None:
             result = q.copy()
-            result[straight] += increment
+            result[coordinates] += increment
             return result
         speeds = np.zeros(model.nu)
         speeds[free] = increment
@@ -308,36 +332,41 @@ def _problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
     return Rest(needed, moved, speed_scales(model)[free], tuple(free))
 
 
-def _of_mechanism(model: CompiledScene, freedom: IndependentSpeeds, q: Array, t: float) -> Rest:
-    """The way of a closed q to rest along the independent speeds there: what the tree needs along
-    the motions that the loops leave, which the loads of loops do not see."""
-    engine, still, closed = model.looped, np.zeros(model.nu), ClosedStates(model, freedom, t)
+def _mechanism_problem(
+    model: CompiledScene, freedom: IndependentSpeeds, q: Array, t: float
+) -> Rest:
+    """Equilibrium problem of a mechanism in its independent speeds at a closed q.
 
-    def along(places: tuple[int, ...]) -> Rest:
-        sizes = closed.sizes[list(places)]
+    The efforts are those of the tree along the free motions of the loops; constraint loads do no
+    work along these.
+    """
+    engine, zeros, states = model.looped, np.zeros(model.nu), ClosedStates(model, freedom, t)
+
+    def problem_along(places: tuple[int, ...]) -> Rest:
+        scales = states.sizes[list(places)]
 
         def needed(q: Array) -> Array:
-            efforts = engine.inverse_dynamics(t, q, still, still, closed.memory)
-            found = np.asarray(freedom.following(q, places).T @ efforts)
-            # What nothing pushes must not go by rounding of what cancels.
-            whole = float(np.abs(efforts) @ freedom.sizes)
-            return np.where(np.abs(found) * sizes > _CANCELLED * whole, found, 0.0)
+            efforts = engine.inverse_dynamics(t, q, zeros, zeros, states.memory)
+            reduced = np.asarray(freedom.following(q, places).T @ efforts)
+            # Motions without load must not follow the rounding of efforts that cancel.
+            work = float(np.abs(efforts) @ freedom.sizes)
+            return np.where(np.abs(reduced) * scales > _CANCELLATION * work, reduced, 0.0)
 
         def moved(q: Array, increment: Array) -> Array:
-            return closed.moved(q, places, increment)
+            return states.moved(q, places, increment)
 
-        problem = Rest(needed, moved, sizes, places, lambda q: there(places, problem, q))
+        problem = Rest(needed, moved, scales, places, lambda q: problem_at(places, problem, q))
         return problem
 
-    def there(places: tuple[int, ...], problem: Rest, q: Array) -> Rest:
+    def problem_at(places: tuple[int, ...], problem: Rest, q: Array) -> Rest:
         chosen = freedom.chosen(q)
-        return problem if chosen == places else along(chosen)
+        return problem if chosen == places else problem_along(chosen)
 
-    return along(freedom.chosen(q))
+    return problem_along(freedom.chosen(q))
 
 
-def _straight_places(model: CompiledScene, free: list[int]) -> NDArray[np.int64] | None:
-    """Places in q whose rates are the free speeds; None where a hinge has others."""
+def _coordinates_of_speeds(model: CompiledScene, free: list[int]) -> NDArray[np.int64] | None:
+    """Indices in q of the coordinates whose rates are the free speeds; None for other hinges."""
     places = np.zeros(model.nu, dtype=np.int64)
     for slots in model.layout.hinges.values():
         if slots.nu and not slots.straight:

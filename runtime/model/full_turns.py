@@ -1,4 +1,4 @@
-"""Whole turns of hinges that make no difference: a way to rest may wind them up."""
+"""Removal of full turns of hinges that have no effect, after a search for equilibrium."""
 
 from __future__ import annotations
 
@@ -19,64 +19,67 @@ if TYPE_CHECKING:
 
 _TURN = 2 * np.pi
 _AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-#: What a turn of nothing may change by rounding, in parts.
-_SAME = 1e-9
+#: Relative change due to rounding when a full turn without effect is removed.
+_TOLERANCE = 1e-9
 
 
-def without_turns(model: CompiledScene, begun: Array, q: Array, t: float) -> Array:
-    """q (nq,) with hinges within half a turn of where they `begun`, where all bodies stay in their
-    places, all efforts as they are, and nothing that the scene asks for reads their angle."""
-    for place in _wound(model, begun, q):
-        turned = q.copy()
-        turned[place] -= _TURN * round((q[place] - begun[place]) / _TURN)
-        if _same(model, q, turned, t):
-            q = turned
+def remove_full_turns(model: CompiledScene, start: Array, q: Array, t: float) -> Array:
+    """q (nq,) with hinge angles within half a turn of the `start` (nq,), without effect.
+
+    A full turn is removed only if all bodies keep their poses, all efforts their values, and no
+    expression, output or controller of the scene reads the angle.
+    """
+    for place in _wound_coordinates(model, start, q):
+        unwound = q.copy()
+        unwound[place] -= _TURN * round((q[place] - start[place]) / _TURN)
+        if _has_same_effect(model, q, unwound, t):
+            q = unwound
     return q
 
 
-def _wound(model: CompiledScene, begun: Array, q: Array) -> Iterator[int]:
-    """Places in q of angles that are more than half a turn away, and that nothing reads by name."""
-    free, read = set(model.free_speeds), None
+def _wound_coordinates(model: CompiledScene, start: Array, q: Array) -> Iterator[int]:
+    """Indices in q of angles more than half a turn from the start that nothing reads by name."""
+    free, referenced = set(model.free_speeds), None
     for name, slots in model.layout.hinges.items():
         if not slots.nu or not slots.straight:
             continue
         for k, unit in enumerate(slots.u_units):
-            place = slots.q + k
-            far = abs(q[place] - begun[place]) > _TURN / 2
-            if not far or unit != "rad/s" or slots.u + k not in free:
+            index = slots.q + k
+            is_wound = abs(q[index] - start[index]) > _TURN / 2
+            if not is_wound or unit != "rad/s" or slots.u + k not in free:
                 continue
-            read = _read(model) if read is None else read
-            if name not in read:
-                yield place
+            referenced = _referenced_hinges(model) if referenced is None else referenced
+            if name not in referenced:
+                yield index
 
 
-def _read(model: CompiledScene) -> set[str]:
-    """Hinges whose coordinates an expression, an output or a controller reads."""
-    scene, found = model.scene, set[str]()
-    for one in active_expressions(scene):
-        found |= {name.text.rpartition(".")[0] for name in one.expression.names}
-        found |= {scene.hinges[number].name for number in one.hinges}
+def _referenced_hinges(model: CompiledScene) -> set[str]:
+    """Names of hinges whose coordinates an expression, output or controller reads."""
+    scene, names_read = model.scene, set[str]()
+    for active in active_expressions(scene):
+        names_read |= {name.text.rpartition(".")[0] for name in active.expression.names}
+        names_read |= {scene.hinges[number].name for number in active.hinges}
     texts = [repr(x) for x in (*scene.output, *scene.controller, *scene.coupling)]
     names = model.layout.hinges
-    return found | {name for name in names if any(f"{name}." in text for text in texts)}
+    return names_read | {name for name in names if any(f"{name}." in text for text in texts)}
 
 
-def _same(model: CompiledScene, q: Array, turned: Array, t: float) -> bool:
-    engine, still = model.looped, np.zeros(model.nu)
+def _has_same_effect(model: CompiledScene, q: Array, unwound: Array, t: float) -> bool:
+    engine, zeros = model.looped, np.zeros(model.nu)
     memory = engine.start_memory()
     probes = [Probe(i, _AXES, (0.0, 0.0, 0.0)) for i in range(engine.packed.topology.count)]
-    seen = []
-    for one in (q, turned):
+    observed = []
+    for state in (q, unwound):
         try:
-            one = SceneSystem(engine).start(t, one, still)[: model.nq]
-            efforts = engine.inverse_dynamics(t, one, still, still, memory)
+            state = SceneSystem(engine).start(t, state, zeros)[: model.nq]
+            efforts = engine.inverse_dynamics(t, state, zeros, zeros, memory)
         except MstmmError:
             return False
-        shown = engine.observe(np.array([t]), one[None], still[None], memory[None], probes,
+        points = engine.observe(np.array([t]), state[None], zeros[None], memory[None], probes,
                                ("points",)).points  # fmt: skip
-        seen.append((efforts, shown[0, :, :3], shown[0, :, 15:24], one))
-    moved = np.abs(seen[1][3] - turned).max(initial=0.0)
-    return bool(moved <= _SAME) and all(
-        np.abs(a - b).max(initial=0.0) <= _SAME * max(1.0, float(np.abs(a).max(initial=0.0)))
-        for a, b in zip(seen[0][:3], seen[1][:3], strict=True)
+        observed.append((efforts, points[0, :, :3], points[0, :, 15:24], state))
+    correction = np.abs(observed[1][3] - unwound).max(initial=0.0)
+    return bool(correction <= _TOLERANCE) and all(
+        np.abs(a - b).max(initial=0.0) <= _TOLERANCE * max(1.0, float(np.abs(a).max(initial=0.0)))
+        for a, b in zip(observed[0][:3], observed[1][:3], strict=True)
     )

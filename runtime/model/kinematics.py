@@ -1,4 +1,4 @@
-"""Where a scene's bodies are and how they move at states; what they carry; states moved on."""
+"""Kinematics, energies and momenta of a compiled scene at given states."""
 
 from __future__ import annotations
 
@@ -25,93 +25,96 @@ _MOMENTA = slice(SUMS["momentum"][2].start, SUMS["angular_momentum"][2].stop)
 
 
 class KinematicQueries(CompiledScene):
-    """A compiled scene, and its kinematics at states.
+    """Compiled scene with kinematics at given states.
 
-    `of` names a body or an end, "rod1" or "rod1.tip", whose origin is meant, or several: then
-    answers have an axis more for them.  Axes are inertial.  Coordinates and speeds are taken as
-    they are given, those that a drive imposes or that loops decide as well.
+    `of` names a body or an end, "rod1" or "rod1.tip", for its origin, or several: then answers have
+    one more axis for them.  Axes are inertial.  Coordinates and speeds are used as given, also
+    driven ones and those that loops determine.
     """
 
     def positions(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
-        """Places (..., 3) in m at q (..., nq).
+        """Positions (..., 3) in m at q (..., nq).
 
-        Raises SceneError, here and below, for a shape that does not fit and for a body or an end
-        that there is not, with the nearest name.
+        All queries raise SceneError for a wrong shape and for an unknown body or end, with the
+        nearest name.
         """
-        found = self._kinematics.call("places", of)(q)
-        if found is None:
-            found = self._places(q, of)[..., POINT_COLUMNS["position"]]
-        return copy_to(out, found)
+        points = self._kinematics.call("places", of)(q)
+        if points is None:
+            points = self._points(q, of)[..., POINT_COLUMNS["position"]]
+        return copy_to(out, points)
 
     def poses(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
-        """Places and axes (..., 4, 4): the matrix that takes [x, y, z, 1] from the axes of the body
-        or end to inertial ones."""
-        alone: Array | None = self._kinematics.call("poses", of)(q)
-        if alone is not None:
-            return copy_to(out, alone)
-        points = self._places(q, of)
-        found = np.zeros((*points.shape[:-1], 4, 4))
-        found[..., :3, :3] = points[..., _AXES].reshape(*points.shape[:-1], 3, 3)
-        found[..., :3, 3] = points[..., POINT_COLUMNS["position"]]
-        found[..., 3, 3] = 1.0
-        return copy_to(out, found)
+        """Poses (..., 4, 4): matrices that transform [x, y, z, 1] to inertial axes.
 
-    def _places(self, q: ArrayLike, of: Names) -> Array:
+        From the axes of the body or end, at q (..., nq).
+        """
+        single: Array | None = self._kinematics.call("poses", of)(q)
+        if single is not None:
+            return copy_to(out, single)
+        points = self._points(q, of)
+        matrices = np.zeros((*points.shape[:-1], 4, 4))
+        matrices[..., :3, :3] = points[..., _AXES].reshape(*points.shape[:-1], 3, 3)
+        matrices[..., :3, 3] = points[..., POINT_COLUMNS["position"]]
+        matrices[..., 3, 3] = 1.0
+        return copy_to(out, matrices)
+
+    def _points(self, q: ArrayLike, of: Names) -> Array:
         lead, (states,) = batch(("q", q, self.nq))
-        return self._shaped(lead, of, self._kinematics.still(of, states))
+        return self._reshape(lead, of, self._kinematics.still(of, states))
 
     def velocities(
         self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
     ) -> Array:
         """Velocity (m/s), then angular velocity (rad/s), (..., 6), at q (..., nq), u (..., nu)."""
-        found = self._kinematics.call("velocities", of)(q, u)
-        if found is None:
+        twists = self._kinematics.call("velocities", of)(q, u)
+        if twists is None:
             lead, states = batch(("q", q, self.nq), ("u", u, self.nu))
-            found = self._shaped(lead, of, self._kinematics.moving(of, *states))
-        return copy_to(out, found)
+            twists = self._reshape(lead, of, self._kinematics.moving(of, *states))
+        return copy_to(out, twists)
 
     def jacobian(self, q: ArrayLike, of: Names, *, out: Array | None = None) -> Array:
-        """J (..., 6, nu) with `velocities` = J u; of the tree, where loops are closed."""
-        alone: Array | None = self._kinematics.call("jacobian", of)(q)
-        if alone is not None:
-            return copy_to(out, alone)
+        """Jacobian J (..., 6, nu) with `velocities` = J u; that of the tree with closed loops."""
+        single: Array | None = self._kinematics.call("jacobian", of)(q)
+        if single is not None:
+            return copy_to(out, single)
         lead, (states,) = batch(("q", q, self.nq))
-        found = self._kinematics.each("jacobian", of, self._kinematics.jacobian, states)
-        return copy_to(out, self._shaped(lead, of, found))
+        matrices = self._kinematics.each("jacobian", of, self._kinematics.jacobian, states)
+        return copy_to(out, self._reshape(lead, of, matrices))
 
     def jacobian_rate(
         self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
     ) -> Array:
-        """dJ/dt (..., 6, nu) along u: accelerations of the point and of its turn are
-        J udot + (dJ/dt) u.  Exact, no differences."""
-        alone: Array | None = self._kinematics.call("jacobian_rate", of)(q, u)
-        if alone is not None:
-            return copy_to(out, alone)
+        """Time derivative dJ/dt (..., 6, nu) of the Jacobian along u; exact.
+
+        Acceleration and angular acceleration are J udot + (dJ/dt) u.
+        """
+        single: Array | None = self._kinematics.call("jacobian_rate", of)(q, u)
+        if single is not None:
+            return copy_to(out, single)
         lead, (states, speeds) = batch(("q", q, self.nq), ("u", u, self.nu))
-        found = self._kinematics.each("jacobian_rate", of, self._jacobian_rate, states, speeds)
-        return copy_to(out, self._shaped(lead, of, found))
+        matrices = self._kinematics.each("jacobian_rate", of, self._jacobian_rate, states, speeds)
+        return copy_to(out, self._reshape(lead, of, matrices))
 
     def _jacobian_rate(self, of: Names, q: Array, u: Array) -> Array:
-        """The same of one state, (k, 6, nu)."""
-        return self._kinematics.jacobian_rate(of, q, u, self._turning(q, u))
+        """`jacobian_rate` (k, 6, nu) of one state."""
+        return self._kinematics.jacobian_rate(of, q, u, self._increment_rates(q, u))
 
     def energy(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
     ) -> Array:
-        """Total energy (...) in J as in a run at the time t (s): kinetic, that of gravity (zero at
-        the inertial origin), of springs and of bent bodies; driven coordinates are where their
-        drive has them.
+        """Total energy (...) in J at time t (s): kinetic, gravity, springs and deformation.
 
-        Raises NumericalFailure where `accelerations` does.
+        The energy of gravity is zero at the inertial origin.  Driven coordinates have the values of
+        their drives.  Raises NumericalFailure where `accelerations` does.
         """
-        found = self._alone.energy(t, q, u)
-        if found is None:
-            found = np.asarray(self._sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1))
-        return copy_to(out, found)
+        total = self._single_state.energy(t, q, u)
+        if total is None:
+            total = np.asarray(self._observe_sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1))
+        return copy_to(out, total)
 
     def energies(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
-        """The three parts of `energy`, (...) each in J: kinetic, gravity, springs."""
-        sums = self._sums(q, u, t)
+        """Parts of `energy` by name, (...) each in J: kinetic, gravity, springs."""
+        sums = self._observe_sums(q, u, t)
         return {
             name.removeprefix("energy."): sums[..., columns.start]
             for name, (_, _, columns) in SUMS.items() if name.startswith("energy.")
@@ -120,29 +123,35 @@ class KinematicQueries(CompiledScene):
     def momentum(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
     ) -> Array:
-        """Momentum in kg*m/s, then angular momentum about the inertial origin in kg*m2/s, (..., 6);
-        see `energy`."""
-        found = self._alone.momentum(t, q, u)
-        return copy_to(out, self._sums(q, u, t)[..., _MOMENTA] if found is None else found)
+        """Momentum (kg*m/s), then angular momentum about the inertial origin (kg*m2/s), (..., 6).
+
+        State and time as in `energy`.
+        """
+        momenta = self._single_state.momentum(t, q, u)
+        return copy_to(
+            out, self._observe_sums(q, u, t)[..., _MOMENTA] if momenta is None else momenta
+        )
 
     def integrate(
         self, q: ArrayLike, u: ArrayLike, dt: ArrayLike, *, out: Array | None = None
     ) -> Array:
-        """q + N(q) u dt (..., nq) of qdot = N(q) u: coordinates after dt (s) at steady rates;
-        quaternions turn at a steady angular velocity and stay units."""
-        alone: Array | None = self._alone.moved(dt, q, u)
-        if alone is not None:
-            return copy_to(out, alone)
+        """Coordinates q + N(q) u dt (..., nq) after dt (s) at constant rates, with qdot = N(q) u.
+
+        Quaternions rotate at a constant angular velocity and keep unit length.
+        """
+        single: Array | None = self._single_state.moved(dt, q, u)
+        if single is not None:
+            return copy_to(out, single)
         lead, (states, speeds, times) = batch(
             ("q", q, self.nq), ("u", u, self.nu), ("dt", dt, None)
         )
-        if self._straight:
+        if self._has_rate_speeds:
             return copy_to(out, (states + speeds * times[:, None]).reshape(*lead, self.nq))
         given = zip(states, speeds, times.tolist(), strict=True)
-        rows = [self._moved(*one_state) for one_state in given]
+        rows = [self._move(*state) for state in given]
         return copy_to(out, np.array(rows).reshape(*lead, self.nq))
 
-    def _moved(self, q: Array, u: Array, dt: float) -> Array:
+    def _move(self, q: Array, u: Array, dt: float) -> Array:
         for first in self._quaternions:
             q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
         engine = self.looped.inertia_alone
@@ -153,70 +162,72 @@ class KinematicQueries(CompiledScene):
     def _quaternions(self) -> list[int]:
         return [int(k) for group in self.layout.groups for k in group.quaternions()]
 
-    def _sums(self, q: ArrayLike, u: ArrayLike, t: ArrayLike) -> Array:
+    def _observe_sums(self, q: ArrayLike, u: ArrayLike, t: ArrayLike) -> Array:
         lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu))
         times, states, speeds = given
         memory = np.tile(self.looped.start_memory(), (len(times), 1))
-        seen = self.looped.observe(times, states, speeds, memory, (), ("sums",))
-        if seen.failures:
-            raise NumericalFailure(seen.failures[0])
-        return seen.sums.reshape(*lead, -1)
+        observed = self.looped.observe(times, states, speeds, memory, (), ("sums",))
+        if observed.failures:
+            raise NumericalFailure(observed.failures[0])
+        return observed.sums.reshape(*lead, -1)
 
-    def _turning(self, q: Array, u: Array) -> Array | None:
-        """The rate of increments by themselves (nu, nu); None where rates are the speeds."""
-        if self._straight:
+    def _increment_rates(self, q: Array, u: Array) -> Array | None:
+        """Rate of tangent increments per increment (nu, nu); None if rates are the speeds."""
+        if self._has_rate_speeds:
             return None
         if not self._steady:
-            return self._differentiated_by(()).turning(q, u)
-        return np.tensordot(u[self._curved], self._brackets, 1)
+            return self._differentiation(()).turning(q, u)
+        return np.tensordot(u[self._quasi_speeds], self._brackets, 1)
 
     @cached_property
-    def _curved(self) -> list[int]:
-        """Places of speeds that are no rates of coordinates."""
+    def _quasi_speeds(self) -> list[int]:
+        """Indices of speeds that are not rates of coordinates."""
         hinges = (hinge for hinge in self.layout.hinges.values() if not hinge.straight)
         return [place for hinge in hinges for place in range(hinge.u, hinge.u + hinge.nu)]
 
     @cached_property
     def _brackets(self) -> Array:
-        """(k, nu, nu): `_turning` by each of those speeds, where no place changes it."""
-        q, units = np.zeros(self.nq), np.eye(self.nu)[self._curved]
+        """Derivative (k, nu, nu) of `_increment_rates` by quasi-speeds, if independent of q."""
+        q, units = np.zeros(self.nq), np.eye(self.nu)[self._quasi_speeds]
         q[self._quaternions] = 1.0
-        by = self._differentiated_by(())
-        return np.array([by.turning(q, unit) for unit in units])
+        differentiation = self._differentiation(())
+        return np.array([differentiation.turning(q, unit) for unit in units])
 
     def _bracket_entries(self) -> Brackets | None:
-        """The same entry by entry, (by, row, column, value); None where places change it."""
-        if self._straight:
+        """Entries (speed, row, column, value) of `_brackets`; None if they depend on q."""
+        if self._has_rate_speeds:
             return []
         if not self._steady:
             return None
-        where = np.argwhere(self._brackets).tolist()
-        return [(self._curved[k], i, j, float(self._brackets[k, i, j])) for k, i, j in where]
+        indices = np.argwhere(self._brackets).tolist()
+        return [
+            (self._quasi_speeds[k], i, j, float(self._brackets[k, i, j])) for k, i, j in indices
+        ]
 
     @cached_property
     def _steady(self) -> bool:
         return all(hinge.straight or hinge.steady for hinge in self.layout.hinges.values())
 
     @cached_property
-    def _straight(self) -> bool:
+    def _has_rate_speeds(self) -> bool:
         return all(hinge.straight for hinge in self.layout.hinges.values())
 
-    def _differentiated_by(self, names: tuple[str, ...]) -> Differentiation:
-        found = self._differentiations.get(names)
-        if found is None:
+    def _differentiation(self, names: tuple[str, ...]) -> Differentiation:
+        differentiation = self._differentiations.get(names)
+        if differentiation is None:
             from .derivatives import Differentiation
 
-            found = self._differentiations[names] = Differentiation(self, names)
-        return found
+            differentiation = self._differentiations[names] = Differentiation(self, names)
+        return differentiation
 
     @cached_property
     def _differentiations(self) -> dict[tuple[str, ...], Differentiation]:
         return {}
 
-    def _shaped(self, lead: tuple[int, ...], of: Names, found: Array) -> Array:
-        """From (states, names, ...) to leading axes, and one name without an axis of its own."""
-        shape = found.shape[2:] if isinstance(of, str) else found.shape[1:]
-        return found.reshape(*lead, *shape)
+    def _reshape(self, lead: tuple[int, ...], of: Names, answers: Array) -> Array:
+        """Answers (states, names, ...) with leading axes, and without an axis for a single name."""
+        shape = answers.shape[2:] if isinstance(of, str) else answers.shape[1:]
+        return answers.reshape(*lead, *shape)
 
     @cached_property
     def _kinematics(self) -> Kinematics:
@@ -227,7 +238,7 @@ class KinematicQueries(CompiledScene):
         return Kinematics(self.looped, self.fusion, references, self._bracket_entries)
 
     @cached_property
-    def _alone(self) -> SingleStateCalls:
+    def _single_state(self) -> SingleStateCalls:
         from ..engine.state_evaluation.single_state import SingleStateCalls
 
         return SingleStateCalls(self.looped, self.fusion)

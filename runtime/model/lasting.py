@@ -1,4 +1,4 @@
-"""Whether an equilibrium lasts while drives move on and loads change with time."""
+"""Check whether an equilibrium lasts while drives move and loads change with time."""
 
 from __future__ import annotations
 
@@ -22,34 +22,34 @@ if TYPE_CHECKING:
 
 
 def check_lasting(
-    model: CompiledScene, found: Equilibrium, t: float, linearise: Callable[[], Linear]
+    model: CompiledScene, equilibrium: Equilibrium, t: float, linearise: Callable[[], Linear]
 ) -> Equilibrium:
-    """The equilibrium of time t (s), with a risk where it is that of a moment; `linearise` gives
-    the linear model about it.
+    """Equilibrium at t (s), with a finding if it does not last.
 
-    Raises NumericalFailure where drives move there and do not leave it at rest.
+    `linearise` returns the linear model about it.  Raises NumericalFailure if moving drives do not
+    keep it at rest.
     """
-    if model.packed.system.steady or not len(found.residuals):
-        return found
-    earlier = found.findings
-    if not _drives_move(model, found, t):
-        found.findings = DeferredRisks(lambda: (*earlier, *_risks(t, linearise)))
-        return found
+    if model.packed.system.steady or not len(equilibrium.residuals):
+        return equilibrium
+    earlier = equilibrium.findings
+    if not _drives_move(model, equilibrium, t):
+        equilibrium.findings = DeferredRisks(lambda: (*earlier, *_risks(t, linearise)))
+        return equilibrium
     risks = tuple(_risks(t, linearise))
     for risk in risks:
         if risk.doubt:
             raise NumericalFailure(
-                f"no equilibrium: {risk.means}; simulate the motion, or let the drives stand still"
+                f"no equilibrium: {risk.means}; simulate the motion, or stop the drives"
             )
-    found.findings = (*earlier, *risks)
-    return found
+    equilibrium.findings = (*earlier, *risks)
+    return equilibrium
 
 
-def _drives_move(model: CompiledScene, found: Equilibrium, t: float) -> bool:
-    """Whether a drive has a speed or an acceleration."""
+def _drives_move(model: CompiledScene, equilibrium: Equilibrium, t: float) -> bool:
+    """Whether any drive has a speed or an acceleration at t (s)."""
     system, engine = model.packed.system, model.looped
-    whole = SceneSystem(engine).start(t, np.asarray(found), np.zeros(model.nu))
-    q, u = whole[None, : model.nq].copy(), whole[None, model.nq : model.nq + model.nu].copy()
+    y = SceneSystem(engine).start(t, np.asarray(equilibrium), np.zeros(model.nu))
+    q, u = y[None, : model.nq].copy(), y[None, model.nq : model.nq + model.nu].copy()
     _, a = engine.accelerations(t, q, u, engine.start_memory()[None])
     first = system.places["u"]
     driven = [int(first[place]) + k for place, k in system.driven]
@@ -57,16 +57,16 @@ def _drives_move(model: CompiledScene, found: Equilibrium, t: float) -> bool:
 
 
 def _risks(t: float, linearise: Callable[[], Linear]) -> Iterator[Risk]:
-    """A risk where the state is left, there or later."""
+    """Risk of a departure from the equilibrium, now or later."""
     try:
         linear = linearise()
         later = LaterStates(linear)
-        leaving = find_departure(linear, later)
+        departure = find_departure(linear, later)
     except (SceneError, NumericalFailure) as failure:
         yield information(
-            "unexamined", "the state", f"not examined for how long it lasts: {failure}",
+            "unexamined", "the state", f"not examined whether it lasts: {failure}",
             "simulate from this state",
         )  # fmt: skip
         return
-    if leaving is not None:
-        yield departure_risk(t, leaving, later.cause)
+    if departure is not None:
+        yield departure_risk(t, departure, later.cause)

@@ -1,4 +1,4 @@
-"""What a model answers as a linear one: motions, responses, and where they become unstable."""
+"""Linear analyses of a model: modes, frequency responses and stability limits."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class LinearAnalysis(DynamicsQueries):
-    """A compiled scene that is asked for small motions; see `Model`."""
+    """Compiled scene with linear analyses; see `Model`."""
 
     def linearize(
         self,
@@ -41,34 +41,36 @@ class LinearAnalysis(DynamicsQueries):
         disturbances: Sequence[str] | None = None,
         friction: Amplitudes = None,
     ) -> Linear:
-        """M x'' + C x' + K x = V v + W w near a state: at rest where nothing is given, else near
-        `q` (nq,) and `u` (nu,; 0, or the scene's start q where only u is given) at time t (s).
+        """Linear model M x'' + C x' + K x = V v + W w about an operating point.
+
+        By default about the equilibrium; else about `q` (nq,) and `u` (nu,; default 0) at time t
+        (s), with q of the scene's start if only u is given.
 
         `inputs` name v and `disturbances` w: efforts of hinges and springs ("shoulder.effort"),
         forces and moments at ends in inertial axes ("boom.tip.force.x", "boom.tip.mz"),
-        accelerations of the ground ("ground.acceleration.y"; all three are w where nothing is
-        named), inputs of the scene that nothing is driven by (all are v where nothing is named).
-        Coordinates that a drive imposes are left out; the others move along with it.  Exact, no
-        differences.  Beside a motion with rolling contacts or rows of speeds it is a
-        `NonholonomicLinear`, which has A and B but no M, C and K.
+        accelerations of the ground ("ground.acceleration.y"; by default all three are w), inputs of
+        the scene that drive no coordinate (by default all are v).  Driven coordinates are left out;
+        the others move relative to the drives.  The derivatives are exact.  About a motion with
+        rolling contacts or velocity constraints the result is a `NonholonomicLinear`, which has A
+        and B but no M, C and K.
 
-        Dry friction of hinges that rest at the state is left out, and `Linear.warnings` has the
-        amplitude below which they stick.  `friction` gives amplitudes V of speed (rad/s or m/s),
-        one or by the names of hinges, chains or speeds, at which it counts as the viscous damping
-        of equal work, 4 F/(pi V) of Coulomb's.  Of hinges that slide it has its own slope.
+        Dry friction of hinges at rest is left out, and `Linear.warnings` has the amplitude below
+        which they stick.  `friction` gives amplitudes V of speed (rad/s or m/s), one or by the
+        names of hinges, chains or speeds, at which friction is replaced by viscous damping of equal
+        work, 4 F/(pi V) for Coulomb friction.  Sliding hinges have the slope of their friction law.
 
-        Raises SceneError for a name or shape that does not fit, NumericalFailure where there is no
-        equilibrium near the scene's start or the state has no accelerations.
+        Raises SceneError for an unknown name or a wrong shape, NumericalFailure if there is no
+        equilibrium near the start of the scene or the state has no accelerations.
         """
-        instead = "call linearize for each of several"
-        return self._linearising(
-            None if q is None else single_state("q", q, self.nq, instead),
-            None if u is None else single_state("u", u, self.nu, instead),
+        remedy = "call linearize for each of several"
+        return self._lineariser(
+            None if q is None else single_state("q", q, self.nq, remedy),
+            None if u is None else single_state("u", u, self.nu, remedy),
             finite_float("t", t, "a time in s"), inputs, disturbances, friction,
         )  # fmt: skip
 
     @cached_property
-    def _linearising(self) -> Lineariser:
+    def _lineariser(self) -> Lineariser:
         from .linearisation import Lineariser
 
         return Lineariser(self)
@@ -83,10 +85,10 @@ class LinearAnalysis(DynamicsQueries):
         damped: bool | None = None,
         friction: Amplitudes = None,
     ) -> Modes:
-        """Natural motions near a state, as `linearize` takes it: all, or the `count` slowest.
+        """Normal modes about an operating point: all, or the `count` slowest.
 
-        With damping and gyroscopic loads where there are any; `damped` False leaves them out.  See
-        `Linear.modes`, and `linearize` for `friction`.
+        Operating point and `friction` as in `linearize`.  With damping and gyroscopic loads, unless
+        `damped` is False.  See `Linear.modes`.
         """
         return self.linearize(q, u, t, friction=friction).modes(count, damped)
 
@@ -97,8 +99,10 @@ class LinearAnalysis(DynamicsQueries):
         q: ArrayLike | None = None,
         t: float = 0.0,
     ) -> DynamicStiffnessModes:
-        """The `count` slowest undamped natural motions at rest, which exact beams hold for alone,
-        all of these or those named.  See `Linear.exact_modes`."""
+        """The `count` slowest undamped modes at rest, with the dynamic stiffness of beams.
+
+        `exact` True for all beams, or the names of some.  See `Linear.exact_modes`.
+        """
         return self.linearize(q, None, t).exact_modes(count, exact)
 
     def frequency_response(
@@ -115,9 +119,11 @@ class LinearAnalysis(DynamicsQueries):
         friction: Amplitudes = None,
         u: ArrayLike | None = None,
     ) -> FrequencyResponse:
-        """Amplitudes of outputs under harmonic inputs at omega (k,) in rad/s, near a state `q`,
-        `u` as `linearize` takes it.  See `Linear.frequency_response`, and `linearize` for
-        `friction`; without `inputs` those of the scene push, else the ground moves."""
+        """Frequency response at omega (k,) in rad/s about an operating point.
+
+        Operating point `q`, `u` and `friction` as in `linearize`; default inputs are those of the
+        scene, or accelerations of the ground without any.  See `Linear.frequency_response`.
+        """
         return self.linearize(q, u, t, friction=friction).frequency_response(
             omega, inputs, outputs, structural=structural, modal=modal, exact=exact
         )
@@ -132,31 +138,31 @@ class LinearAnalysis(DynamicsQueries):
         friction: Amplitudes = None,
         frame: str = "auto",
     ) -> RootLocus:
-        """Natural motions at rest over a number of the scene, named as in `with_parameters`: its
-        root locus, or Campbell's diagram where it is a spin ("constants.spin" in a drive);
-        `friction` as in `linearize`.
+        """Root locus of the modes at rest over a parameter, or Campbell diagram over a spin.
 
-        `frame` of the frequencies: "auto" is the fixed frame where all rotors are axisymmetric,
-        else the rotating one of their coordinates, with a warning; "fixed" and "rotating" are
-        these by name.
+        `parameter` is named as in `with_parameters`; a spin is one such as "constants.spin" in a
+        drive.  `friction` as in `linearize`.  `frame` of the frequencies: "auto" is the fixed frame
+        if all rotors are axisymmetric, else the rotating one of their coordinates, with a warning;
+        "fixed" and "rotating" select one.
 
-        Raises SceneError for an unknown name, values (m,) that make no sense and rotors without a
-        fixed frame, NumericalFailure where there is no equilibrium.
+        Raises SceneError for an unknown name, invalid values (m,) and rotors without a fixed frame,
+        NumericalFailure if there is no equilibrium.
         """
         from ..linear.root_locus import trace_modes
 
         points = one_row("values", values)
-        at = self._linear_at(parameter, friction)
-        return trace_modes(at, parameter, points, count, damped, frame)
+        model_at = self._linear_model_at(parameter, friction)
+        return trace_modes(model_at, parameter, points, count, damped, frame)
 
     def waterfall(
         self, parameter: str, values: ArrayLike, omega: ArrayLike, input: str, output: str
     ) -> Waterfall:
-        """`frequency_response` of one output under one input over a number of the scene too."""
+        """Frequency response of one output to one input over a parameter and omega (rad/s)."""
         from ..linear.waterfall import waterfall
 
         points = one_row("values", values)
-        return waterfall(self._linear_at(parameter), parameter, points, omega, (input, output))
+        model_at = self._linear_model_at(parameter)
+        return waterfall(model_at, parameter, points, omega, (input, output))
 
     def unbalance_response(
         self,
@@ -166,27 +172,28 @@ class LinearAnalysis(DynamicsQueries):
         unbalance: float,
         points: Sequence[str] | None = None,
     ) -> UnbalanceResponse:
-        """Whirl of `points`, bodies or ends, under an unbalance m e (kg m) that turns with the body
-        of the end `at`, over a number of the scene that sets its spin ("constants.spin" in a
-        drive); of `at` itself unless points are given.
+        """Whirl of `points` due to an unbalance m e (kg m) at the end `at`, over a spin.
 
-        Steady and linear about the equilibrium, in the fixed frame, at the frequency of the spin.
-        Raises SceneError for unknown names and rotors that are not axisymmetric,
-        NumericalFailure at a critical speed without damping.
+        `points` are bodies or ends, by default `at`.  The unbalance rotates with the body of `at`;
+        `parameter` sets its spin, such as "constants.spin" in a drive.  The response is steady and
+        linear about the equilibrium, in the fixed frame, at the frequency of the spin.  Raises
+        SceneError for unknown names and rotors that are not axisymmetric, NumericalFailure at a
+        critical speed without damping.
         """
         from ..linear.rotors.unbalance import unbalance_response
 
-        found = [at] if points is None else some_names("points", points)
+        observed = [at] if points is None else some_names("points", points)
         speeds = one_row("values", values)
         return unbalance_response(
-            self._linear_at(parameter, inputs=()), parameter, speeds, at, unbalance, found
+            self._linear_model_at(parameter, inputs=()), parameter, speeds, at, unbalance, observed
         )
 
     def critical(
         self, parameter: str, stable: float, unstable: float, *, friction: Amplitudes = None
     ) -> StabilityLimit:
-        """Where between two values of a number of the scene a motion near rest begins to grow: the
-        buckling load, the speed of flutter.  By bisection; of several places one is found;
+        """Parameter value at the stability limit, such as a buckling load or flutter speed.
+
+        By bisection between a `stable` and an `unstable` value; finds one of several limits.
         `friction` as in `linearize`.
 
         Raises SceneError for an unknown name, or ends that are not stable and unstable.
@@ -194,9 +201,9 @@ class LinearAnalysis(DynamicsQueries):
         from ..linear.root_locus import critical
 
         ends = finite_float("stable", stable), finite_float("unstable", unstable)
-        return critical(self._linear_at(parameter, friction), parameter, *ends)
+        return critical(self._linear_model_at(parameter, friction), parameter, *ends)
 
-    def _linear_at(
+    def _linear_model_at(
         self, parameter: str, friction: Amplitudes = None, inputs: Sequence[str] | None = None
     ) -> Callable[[float], Linear]:
         return lambda value: self.with_parameters({parameter: value}).linearize(

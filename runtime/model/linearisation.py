@@ -1,4 +1,4 @@
-"""Where a model is made linear: at its equilibrium, or at a state that is given."""
+"""Linearisation of a model about its equilibrium or a given state."""
 
 from __future__ import annotations
 
@@ -29,27 +29,29 @@ from .equilibrium import equilibrium
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
 
-#: A start this near to rest, in sizes of its coordinates, is one though nothing holds it there.
+#: Relative residual up to which a start counts as at rest though it has no unique equilibrium.
 _AT_REST = 1e-9
-#: How far coordinates of the equilibrium may be off, in sizes; see `Model.equilibrium`.
+#: Tolerance of the equilibrium in characteristic scales; see `Model.equilibrium`.
 _TOLERANCE = 1e-10
-#: The remedy where a scene that starts with speeds has no equilibrium.
-_AT_START = (
+#: Remedy if a scene that starts with speeds has no equilibrium.
+_START_REMEDY = (
     "the scene starts with speeds: for their motion give its state, "
     "linearize(*model.initial_state()), or --at-start on the command line"
 )
 
 
 class Lineariser:
-    """Makes one model linear, at many states."""
+    """Linearisation of one model about any number of states."""
 
     def __init__(self, model: CompiledScene) -> None:
         self._model = model
         system, layout = model.packed.system, model.layout
         twists = any(law.twist >= 0 for law in system.laws)
-        #: Whether states are in order as they are given.
-        self._settled = not (len(layout.quaternions) or system.driven or twists or system.closes)
-        self._straight = all(h.straight for h in layout.hinges.values() if h.nu)
+        #: Whether any given state is consistent, without drives, loops or unit quaternions.
+        self._is_consistent = not (
+            len(layout.quaternions) or system.driven or twists or system.closes
+        )
+        self._has_rate_speeds = all(h.straight for h in layout.hinges.values() if h.nu)
 
     def __call__(
         self,
@@ -61,41 +63,42 @@ class Lineariser:
         friction: Amplitudes = None,
     ) -> Linear:
         """See `Model.linearize`."""
-        pushes, others = self._inputs, self._ground
+        v_channels, w_channels = self._inputs, self._ground
         if inputs is not None:
-            pushes = input_channels(self._model, "inputs", inputs)
+            v_channels = input_channels(self._model, "inputs", inputs)
         if disturbances is not None:
-            others = input_channels(self._model, "disturbances", disturbances)
-        given = q is not None or u is not None
-        q, u = self._state(q, u, t)
-        at_speeds = None if given else partial(self._at_speeds, q, t)
-        model, about, dry = self._model, None, dry_friction(self._model, u, friction)
+            w_channels = input_channels(self._model, "disturbances", disturbances)
+        is_given = q is not None or u is not None
+        q, u = self._operating_point(q, u, t)
+        at_speeds = None if is_given else partial(self._at_speed, q, t)
+        model, equations, dry = self._model, None, dry_friction(self._model, u, friction)
         if model.freedom is None and not dry:
-            about = model.slopes.at(t, q, u)
-        if about is not None:
-            turning = None if self._straight or not u.any() else about.G
-            state = State(t, q, u, about.a)
-            return Linear(model, state, pushes, others, turning, about, at_speeds=at_speeds)
+            equations = model.slopes.at(t, q, u)
+        if equations is not None:
+            turning = None if self._has_rate_speeds or not u.any() else equations.G
+            state = State(t, q, u, equations.a)
+            channels = v_channels, w_channels
+            return Linear(model, state, *channels, turning, equations, at_speeds=at_speeds)
         state = State(t, q, u, self._accelerations(t, q, u))
-        bare = Linear(model, state, pushes, others, dry=dry, at_speeds=at_speeds)
+        bare = Linear(model, state, v_channels, w_channels, dry=dry, at_speeds=at_speeds)
         if model.freedom is not None:
-            return self._of_mechanism(bare)
-        return replace(bare, turning=self._turning(state))
+            return self._mechanism_model(bare)
+        return replace(bare, turning=self._rate_matrix(state))
 
-    def _of_mechanism(self, bare: Linear) -> Linear:
+    def _mechanism_model(self, bare: Linear) -> Linear:
         model, state, dry = self._model, bare.state, bare.dry
         if state.u.any() and has_speed_rows(model):
-            return nonholonomic_at(bare, self._slopes)
+            return nonholonomic_at(bare, self._acceleration_slopes)
         if not state.u.any():
-            found = replace(bare, mechanism=mechanism_at(model, state, dry))
-            if not is_unsteady(found):
-                return found
-        loops = moving_at(model, state, self._slopes, dry=dry)
+            linear = replace(bare, mechanism=mechanism_at(model, state, dry))
+            if not is_unsteady(linear):
+                return linear
+        loops = moving_at(model, state, self._acceleration_slopes, dry=dry)
         turning = None if loops is None else loops.turning
         return replace(bare, turning=turning, mechanism=loops)
 
-    def _at_speeds(self, q: Array, t: float, u: Array) -> Linear:
-        """At the same place with speeds u (nu,), without inputs."""
+    def _at_speed(self, q: Array, t: float, u: Array) -> Linear:
+        """Linear model about the same q with speeds u (nu,), without inputs."""
         return self(q, u, t, (), ())
 
     @cached_property
@@ -106,33 +109,33 @@ class Lineariser:
     def _ground(self) -> tuple[Channel, ...]:
         return input_channels(self._model, "disturbances", GROUND)
 
-    def _state(self, q: Array | None, u: Array | None, t: float) -> tuple[Array, Array]:
-        """The state that is given with its drives, or rest."""
+    def _operating_point(self, q: Array | None, u: Array | None, t: float) -> tuple[Array, Array]:
+        """Given state, with consistent drives and loops, or the equilibrium."""
         model = self._model
         speeds = np.zeros(model.nu) if u is None else u
         if q is None:
-            q = _rest(model, t) if u is None else initial_state(model)[0]
-        if self._settled:
+            q = _equilibrium_or_start(model, t) if u is None else initial_state(model)[0]
+        if self._is_consistent:
             return q, speeds
-        whole = SceneSystem(model.looped).start(t, q, speeds)
-        return whole[: model.nq], whole[model.nq : model.nq + model.nu]
+        y = SceneSystem(model.looped).start(t, q, speeds)
+        return y[: model.nq], y[model.nq : model.nq + model.nu]
 
     def _accelerations(self, t: float, q: Array, u: Array) -> Array:
-        """Refuses a state that has none."""
+        """Accelerations (nu,) of a state; raises NumericalFailure if it has none."""
         engine = self._model.looped
         memory = engine.start_memory()
         return engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None])[1][0]
 
-    def _turning(self, state: State) -> Array | None:
-        """See `Linear.turning`; exact."""
+    def _rate_matrix(self, state: State) -> Array | None:
+        """Exact `Linear.turning`; None if coordinate rates are the speeds."""
         model = self._model
-        if self._straight or not state.u.any():
+        if self._has_rate_speeds or not state.u.any():
             return None
-        found = self._differentiation.turning(state.q, state.u, state.t)
-        return np.asarray(found[np.ix_(model.free_speeds, model.free_speeds)])
+        matrix = self._differentiation.turning(state.q, state.u, state.t)
+        return np.asarray(matrix[np.ix_(model.free_speeds, model.free_speeds)])
 
-    def _slopes(self, state: State) -> dict[str, Array]:
-        """Exact slopes of the accelerations, by the names of `Derivatives`."""
+    def _acceleration_slopes(self, state: State) -> dict[str, Array]:
+        """Exact derivatives of the accelerations by the names of `Derivatives`."""
         of = np.array([[state.t]]), state.q[None], state.u[None], np.zeros((1, self._model.nu))
         return {name: found[0] for name, found in self._differentiation.at(*of).items()}
 
@@ -141,32 +144,32 @@ class Lineariser:
         return Differentiation(self._model, ())
 
 
-def _rest(model: CompiledScene, t: float) -> Array:
-    """The equilibrium, or the start where it is at rest though nothing holds it there."""
+def _equilibrium_or_start(model: CompiledScene, t: float) -> Array:
+    """Equilibrium (nq,), or the start if it is at rest without a unique equilibrium."""
     start, speeds = initial_state(model)
     try:
         return np.asarray(equilibrium(model, start, t, _TOLERANCE))
     except NumericalFailure as failure:
         q = SceneSystem(model.looped).start(t, start, np.zeros(model.nu))
-        if not _at_rest(model, q[: model.nq], t):
+        if not _is_at_rest(model, q[: model.nq], t):
             if speeds[list(model.free_speeds)].any():
-                raise NumericalFailure(f"{failure}; {_AT_START}") from None
+                raise NumericalFailure(f"{failure}; {_START_REMEDY}") from None
             raise
         return q[: model.nq]
 
 
-def _at_rest(model: CompiledScene, q: Array, t: float) -> bool:
-    """Whether what is missing at a state is rounding beside the stiffness that there is."""
-    free, still, engine = list(model.free_speeds), np.zeros(model.nu), model.looped
-    state = State(t, q, still, still)
-    efforts = engine.inverse_dynamics(t, q, still, still, engine.start_memory())
+def _is_at_rest(model: CompiledScene, q: Array, t: float) -> bool:
+    """Whether the residual efforts of a state are rounding, relative to its stiffness."""
+    free, zeros, engine = list(model.free_speeds), np.zeros(model.nu), model.looped
+    state = State(t, q, zeros, zeros)
+    efforts = engine.inverse_dynamics(t, q, zeros, zeros, engine.start_memory())
     loops = mechanism_at(model, state)
     if loops is not None:
         free, missing = list(loops.places), loops.ways.T @ efforts
         stiffness = loops.matrices(loops.tree, state).K
     else:
         missing, stiffness = efforts[free], matrices(engine, state, free).K
-    sizes = speed_scales(model)[free]
-    missing, stiffness = missing * sizes, stiffness * np.outer(sizes, sizes)
+    scales = speed_scales(model)[free]
+    missing, stiffness = missing * scales, stiffness * np.outer(scales, scales)
     scale = float(np.abs(stiffness).max(initial=0))
     return float(np.abs(missing).max(initial=0)) <= _AT_REST * scale

@@ -1,4 +1,4 @@
-"""Model: a compiled scene, and everything that can be asked of it."""
+"""Model: a compiled scene with all queries, simulations and linear analyses."""
 
 from __future__ import annotations
 
@@ -34,50 +34,54 @@ if TYPE_CHECKING:
 
 
 class Model(LinearAnalysis, NotebookDisplay):
-    """A scene ready to compute.  Made by `mstmm.compile`.
+    """Compiled scene; created by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
     quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
     """
 
     def __repr__(self) -> str:
-        return f"<Model: {self.scene.summary}, {self._freedom} degrees of freedom; {self.engine}>"
+        return f"<Model: {self.scene.summary}, {self._mobility} degrees of freedom; {self.engine}>"
 
     def _repr_html_(self) -> str:
-        rows = [("degrees of freedom", self._freedom), ("engine", self.engine_choice)]
+        rows = [("degrees of freedom", self._mobility), ("engine", self.engine_choice)]
         return table(rows) + self.scene._repr_html_()
 
     @property
-    def _freedom(self) -> int:
-        """How many speeds are free, of those that loops leave."""
+    def _mobility(self) -> int:
+        """Number of degrees of freedom: free speeds, less those that loops constrain."""
         return len(self.free_speeds) if self.closed is None else self.closed.loops.mobility
 
     def initial_state(self) -> tuple[Array, Array]:
-        """(q, u) at t = 0 as the scene gives them, driven coordinates included."""
-        q, u = self._start
+        """Initial state (q, u) of the scene at t = 0, with driven coordinates."""
+        q, u = self._initial_state
         return q.copy(), u.copy()
 
     @cached_property
-    def _start(self) -> tuple[Array, Array]:
-        """What `initial_state` gives, computed once: a scene does not change."""
+    def _initial_state(self) -> tuple[Array, Array]:
+        """Cached result of `initial_state`."""
         from ..run.start_state import initial_state
 
         return initial_state(self)
 
     @property
     def loops(self) -> LoopAnalysis:
-        """What closes in the scene: cut hinges, rows and those that repeat others, mobility."""
+        """Closed-loop analysis: cut hinges, constraint rows, redundant rows, mobility."""
         from ..engine.loops.loop_analysis import LoopAnalysis
 
         if self.closed is None:
             return LoopAnalysis()
-        return replace(self.closed.loops, decided_by=self._independent, found_by=self._branches)
+        return replace(
+            self.closed.loops,
+            decided_by=self._independent_speed_names,
+            found_by=self._find_branches,
+        )
 
-    def _branches(self) -> tuple[Branch, ...]:
+    def _find_branches(self) -> tuple[Branch, ...]:
         assert self.closed is not None
         return self.closed.branches
 
-    def _independent(self) -> tuple[str, ...]:
+    def _independent_speed_names(self) -> tuple[str, ...]:
         assert self.freedom is not None
         return tuple(self.layout.u_name(place) for place in self.freedom.places)
 
@@ -89,35 +93,41 @@ class Model(LinearAnalysis, NotebookDisplay):
         t: float = 0.0,
         branch: int | None = None,
     ) -> Assembly:
-        """The nearest (q, u) at which all loops are closed at t (s), near the start where nothing
-        is given.
+        """Nearest state (q, u) that satisfies all constraints at t (s).
 
-        q (nq,) and u (nu,) are wishes, but for the coordinates of the hinges named in `hold`, and
-        for the speeds of hinges that have some, which stay what they are where these are no more
-        than the mechanism has freedoms; driven coordinates and couplings that go by time are those
-        at t.  Of the ways in which the loops can close that which is nearest to q is taken, of
-        those that are found; on it what changes changes least, by inertia.  Without loops the state
-        itself.
+        q (nq,) and u (nu,) are target values, by default those of the start.  Coordinates of the
+        hinges named in `hold` keep their values, as do nonzero speeds of hinges, if these are not
+        more than the mobility.  Driven coordinates and time-dependent couplings have their values
+        at t.  Of the assembly branches found, the one nearest to q is used; on it the change is
+        smallest in the norm of the inertia.  Without loops the state is returned unchanged.
 
-        `branch` is the number of one of `loops.branches` to be on instead: from its pose the held
-        coordinates are led to those in q by small steps, and nothing else in q counts.
+        `branch` is the number of one of `loops.branches` to use instead: from its pose the held
+        coordinates move to those in q in small steps, and all others in q are ignored.
 
-        Raises SceneError for a hinge or branch that there is not, for loops that do not close near
-        the state, for a branch that ends before, and for speeds that contradict each other.
+        Raises SceneError for an unknown hinge or branch, for loops that do not close near the
+        state, for a branch that ends before, and for speeds that contradict each other.
         """
         from .assembly import assemble
 
-        start, only = self.initial_state(), "assemble takes one state; see assemble_path"
-        wish_q = start[0] if q is None else single_state("q", q, self.nq, only)
-        wish_u = start[1] if u is None else single_state("u", u, self.nu, only)
-        fast = self.closed.fast if u is None and self.closed is not None else None
+        initial, remedy = self.initial_state(), "assemble takes one state; see assemble_path"
+        target_q = initial[0] if q is None else single_state("q", q, self.nq, remedy)
+        target_u = initial[1] if u is None else single_state("u", u, self.nu, remedy)
+        moving_hinges = self.closed.fast if u is None and self.closed is not None else None
         return assemble(
-            self, wish_q, wish_u, hold, fast, finite_float("t", t, "a time in s"), branch
+            self,
+            target_q,
+            target_u,
+            hold,
+            moving_hinges,
+            finite_float("t", t, "a time in s"),
+            branch,
         )
 
     def assemble_path(self, q: ArrayLike, hold: Sequence[str], branch: int = 0) -> Array:
-        """Closed states (n, nq) with the coordinates of the hinges named in `hold` as in the rows
-        of q (n, nq), each found from the one before by small steps, so that they lie on one branch:
+        """Closed states (n, nq) on one branch along a path of held coordinates.
+
+        The coordinates of the hinges named in `hold` are those in the rows of q (n, nq).  Each
+        state is found from the one before in small steps, so that all are on the branch with
         number `branch` of `loops.branches`.
 
         Raises SceneError as `assemble` does; OpenLoop where the branch ends.
@@ -128,14 +138,13 @@ class Model(LinearAnalysis, NotebookDisplay):
         return assemble_path(self, rows, hold, branch)
 
     def refuse_undetermined_start(self) -> None:
-        """SceneError naming the hinges if the masses leave a motion of the start undetermined."""
+        """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
         from .undetermined_start import refuse_undetermined_start
 
         refuse_undetermined_start(self, *self.initial_state())
 
     def refuse_unknown_outputs(self) -> None:
-        """SceneError for the first output of the scene of a quantity that results do not have, and
-        for what controllers cannot measure."""
+        """Raise SceneError for outputs and controller measurements that results do not have."""
         if self.scene.output or self.scene.controller:
             from ..result.scene_outputs import quantity_of
 
@@ -152,33 +161,34 @@ class Model(LinearAnalysis, NotebookDisplay):
         max_steps: int = 2000,
         progress: Callable[[int, float], None] | None = None,
     ) -> Equilibrium:
-        """q (nq,) at which every acceleration vanishes at rest, downhill from `q` (or the start).
+        """Static equilibrium (nq,): q of zero acceleration at rest, near `q` or the start.
 
-        `tolerance` is how far coordinates may be off: rad, or parts of the length of what they
-        move.  The array found has `residuals`, the efforts still missing by the names of speeds,
-        and `unstable`, those with which it leaves a saddle.  Steps that lead downhill become those
-        of Newton's method, O(bodies) each, with closed loops too; `max_steps` of them are taken at
-        most, and `progress` is called with the number and the length of every one, in rad or parts
-        of lengths.  Hinges that nothing counts turns of end within half a turn of the start.
+        `tolerance` is the largest error of coordinates: rad, or relative to the length of the parts
+        that they move.  The returned array has `residuals`, the remaining efforts by the names of
+        speeds, and `unstable`, the speeds with which the motion leaves a saddle.  Descent steps
+        turn into Newton steps, O(bodies) each, with closed loops too.  `max_steps` limits their
+        number; `progress` is called with the number and the length of each, in rad or relative to
+        lengths.
+        Hinges whose number of turns has no effect end within half a turn of the start.
 
-        Drives are where they are at t (s), loads what they are then.  Where drives move there, what
-        is found is the rest beside them, which has to last: as long as they go on, no effort may be
-        missing.  Where loads or drives change later alone, `warnings` says so.
+        Drives and loads have their values at t (s).  Where drives move at t, the result is the rest
+        relative to them, which has to last: no effort may be missing while they move on.
+        `warnings` tells where loads or drives change only later.
 
-        Raises NumericalFailure naming the coordinates that nothing determines; with the efforts
-        that are left, if there is no equilibrium near the start, or none at all; and where drives
-        that move on do not leave it at rest.
+        Raises NumericalFailure naming the undetermined coordinates; with the remaining efforts, if
+        there is no equilibrium near the start, or none at all; and where moving drives do not keep
+        the state at rest.
         """
         from .equilibrium import equilibrium
         from .lasting import check_lasting
 
-        instead = "call equilibrium for each of several"
-        start = self.initial_state()[0] if q is None else single_state("q", q, self.nq, instead)
+        remedy = "call equilibrium for each of several"
+        start = self.initial_state()[0] if q is None else single_state("q", q, self.nq, remedy)
         t, tolerance = finite_float("t", t, "a time in s"), finite_float("tolerance", tolerance)
-        most = integer("max_steps", max_steps, 1, "a number of steps from 1 on")
-        found = equilibrium(self, start, t, tolerance, most, progress)
-        linearise = partial(self.linearize, np.asarray(found), None, t, inputs=(), disturbances=())
-        return check_lasting(self, found, t, linearise)
+        step_limit = integer("max_steps", max_steps, 1, "a number of steps from 1 on")
+        state = equilibrium(self, start, t, tolerance, step_limit, progress)
+        linearise = partial(self.linearize, np.asarray(state), None, t, inputs=(), disturbances=())
+        return check_lasting(self, state, t, linearise)
 
     def simulate(
         self,
@@ -206,7 +216,7 @@ class Model(LinearAnalysis, NotebookDisplay):
         checkpoint: str | Path | None = None,
         resume: bool = False,
     ) -> Result:
-        """Integrate to `t_end` (s).
+        """Simulate to `t_end` (s).
 
         Args:
             method: rk4 (with `step`), dopri5, dop853, pirk13 (order 13, for smooth motions on fused
@@ -223,12 +233,12 @@ class Model(LinearAnalysis, NotebookDisplay):
             step: fixed step in s; otherwise `rtol` (1e-9) and `atol` (1e-12) control the step.
             output_times: times of the samples (s, increasing), a lone whole number excepted;
                 otherwise every accepted step (with an error 201 samples).
-            error: largest error wanted of the whole run, instead of tolerances: in rad, and of
-                coordinates that are no angles in parts of the largest excursion of their unit.
-                Several runs find the tolerance; `Result.error_estimate` says what was reached.
-            error_of: names of quantities whose error is meant, instead of all coordinates: of one
-                in its unit, of several in parts of how far each goes.
-            t_start: time of the start in s, which drives, loads and signals see.
+            error: target error of the whole run, instead of tolerances: in rad, and of other
+                coordinates relative to the largest excursion of their unit.  Several runs find the
+                tolerance; `Result.error_estimate` is the achieved error.
+            error_of: names of quantities of the target error, instead of all coordinates: one in
+                its unit, several relative to the excursion of each.
+            t_start: start time in s for drives, loads and signals.
             max_step, max_steps: longest step in s and largest number of steps; 0 for no limit.
             radius: spectral radius, 0 to 1, that genalpha and dttmm leave to infinitely fast motion
                 (0.8); below 1 with genalpha-index3.
@@ -238,21 +248,21 @@ class Model(LinearAnalysis, NotebookDisplay):
                 slopes of hinges' laws alone, for those that do without the exact one (ros34pw2,
                 rodas4pw, and methods that iterate); auto, exact but where iterations may begin
                 with laws.
-            initial: (q, u) instead of the scene's own start.
-            inputs: what inputs of the scene are in this run, by their names, as in `with_inputs`:
-                numbers, names of signals, (times, values), or the keys of a [[signal]].
+            initial: (q, u) instead of the initial state of the scene.
+            inputs: inputs of the scene in this run by name, as in `with_inputs`: numbers, names of
+                signals, (times, values), or the keys of a [[signal]].
             certify: estimate the error by a second, more accurate run.
-            on_risk: where something speaks against the numbers (`Result.risks`): warn, in the
-                result; refuse, which raises RiskRefused, before the run where it is seen there,
-                else behind it with the result; ignore, which tells nothing in `warnings`.
+            on_risk: action on objections to the result (`Result.risks`): warn, in the result;
+                refuse, which raises RiskRefused, before the run if known by then, else after it
+                with the result; ignore, which leaves `warnings` empty.
             progress: called with (t, t_end) about every 0.1 s.  An exception that it raises ends
                 the run and is raised here; a checkpoint is written before.
-            checkpoint: file that keeps the run every 30 s, when it is interrupted, and when it has
-                ended, until the result is saved.
-            resume: continue from that file, if it is there, bit for bit.
+            checkpoint: file with the state of the run, written every 30 s, on interruption, and at
+                the end, until the result is saved.
+            resume: continue from that file, if it exists, bit for bit.
 
         Returns a Result, also after a failure: `success`, `message` and everything computed so far.
-        Raises SceneError for settings that make no sense, RiskRefused where `on_risk` asks for it.
+        Raises SceneError for invalid settings, RiskRefused with on_risk = "refuse".
         """
         from ..risk_checks.risk_policy import apply_policy, check_start
         from .run_results import simulate
@@ -261,7 +271,7 @@ class Model(LinearAnalysis, NotebookDisplay):
         model = self if inputs is None else self.with_inputs(inputs)
         certify, resume = require_bool("certify", certify), require_bool("resume", resume)
         given = Control(method, step, rtol, atol)
-        wanted = parse_error_request(error, error_of, given, checkpoint is not None or resume)
+        request = parse_error_request(error, error_of, given, checkpoint is not None or resume)
         method, rtol, atol = given.filled()
         settings = validate(
             Settings(
@@ -271,17 +281,17 @@ class Model(LinearAnalysis, NotebookDisplay):
             )
         )  # fmt: skip
         q, u = model.initial_state() if initial is None else split_state("initial", initial)
-        instead = "simulate_batch takes many"
+        remedy = "simulate_batch takes many"
         q, u = (
-            single_state("initial q", q, self.nq, instead),
-            single_state("initial u", u, self.nu, instead),
+            single_state("initial q", q, self.nq, remedy),
+            single_state("initial u", u, self.nu, remedy),
         )
         seen = check_start(model, settings, q, u, on_risk)
-        if wanted is not None:
+        if request is not None:
             from .target_error import tolerance_search
 
             result = tolerance_search.simulate(
-                model, settings, wanted, q, u, seen=seen, certify=certify, progress=progress
+                model, settings, request, q, u, seen=seen, certify=certify, progress=progress
             )
         else:
             result = simulate(
@@ -304,43 +314,53 @@ class Model(LinearAnalysis, NotebookDisplay):
         radius: float | None = None,
         tangent: str = "auto",
     ) -> Session:
-        """A run in the caller's hands: `advance(dt, inputs={...})` goes on tick by tick.
+        """Start a run that the caller advances: `session.advance(dt, inputs={...})`.
 
-        From q (nq,) and u (nu,), the scene's start where they are not given, at t (s).  method,
-        step, rtol, atol, max_step, radius and tangent as in `simulate`, but for the methods auto,
-        SciPy's, SUNDIALS' and the classical ones, which make whole runs.  A fixed step is checked
-        once per model and step: what speaks against it is in `warnings` of every such session.
+        From q (nq,) and u (nu,), by default the start of the scene, at t (s).  method, step, rtol,
+        atol, max_step, radius and tangent as in `simulate`, except the methods auto, of SciPy, of
+        SUNDIALS and the classical ones, which only make whole runs.  A fixed step is checked once
+        per model and step; objections are in `warnings` of every such session.
 
-        Raises SceneError for settings or a state that make no sense.
+        Raises SceneError for invalid settings or an invalid state.
         """
         from .session import Session
 
-        at = finite_float("t", t, "a time in s")
-        given = METHOD if method is None else method
+        t_start = finite_float("t", t, "a time in s")
+        method_name = METHOD if method is None else method
         tolerances = RTOL if rtol is None else rtol, ATOL if atol is None else atol
         settings = validate(
-            Settings(at, at, given, step, *tolerances, (), max_step, radius=radius, tangent=tangent)
+            Settings(
+                t_start,
+                t_start,
+                method_name,
+                step,
+                *tolerances,
+                (),
+                max_step,
+                radius=radius,
+                tangent=tangent,
+            )
         )
-        start, instead = self.initial_state(), "make a session for each of several"
+        start, remedy = self.initial_state(), "make a session for each of several"
         state = (
-            start[0] if q is None else single_state("q", q, self.nq, instead),
-            start[1] if u is None else single_state("u", u, self.nu, instead),
+            start[0] if q is None else single_state("q", q, self.nq, remedy),
+            start[1] if u is None else single_state("u", u, self.nu, remedy),
         )
         return Session(self, settings, *state, self._step_risks(settings, *state))
 
     def _step_risks(self, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
-        """What speaks against a fixed step at the first state from which it is to be taken."""
+        """Objections to a fixed step, checked once at the first state of a session with it."""
         if settings.step is None:
             return ()
         key = settings.method, settings.step, settings.radius
-        if key not in self._steps_checked:
+        if key not in self._step_risk_cache:
             from .session import step_risks
 
-            self._steps_checked[key] = step_risks(self, settings, q, u)
-        return self._steps_checked[key]
+            self._step_risk_cache[key] = step_risks(self, settings, q, u)
+        return self._step_risk_cache[key]
 
     @cached_property
-    def _steps_checked(self) -> dict[tuple[str, float, float | None], tuple[Risk, ...]]:
+    def _step_risk_cache(self) -> dict[tuple[str, float, float | None], tuple[Risk, ...]]:
         return {}
 
     def simulate_batch(
@@ -362,25 +382,24 @@ class Model(LinearAnalysis, NotebookDisplay):
         tangent: str = "auto",
         threads: int | None = None,
     ) -> BatchResult:
-        """Integrate n independent trajectories to `t_end` (s).
+        """Simulate n independent trajectories to `t_end` (s).
 
         Args:
-            initial_states: q (n, nq) and u (n, nu); a single row serves all.
+            initial_states: q (n, nq) and u (n, nu); a single row is used for all.
             parameters: numbers by name (as in `with_parameters`), (n,) or one for all.
-            inputs: what inputs of the scene are, by their names: as in `simulate`, and numbers (n,)
-                for each, or (times, values) and the keys of a [[signal]] with values (n, m).
+            inputs: inputs of the scene by name: as in `simulate`, and numbers (n,), or (times,
+                values) and the keys of a [[signal]] with values (n, m).
             output_times: times of the samples (s, increasing); otherwise `t_end` alone.
-            threads: as many as the machine has processors if not given.
+            threads: by default the number of processors.
             method, step, rtol, atol, t_start, max_step, max_steps, radius, tangent: as in
                 `simulate`; the method auto chooses for each trajectory.
 
-        Trajectories run side by side in the lanes of vectors, by explicit methods, where the scene
-        has neither events, releases, twist springs nor drives, and over threads.  The numbers of
-        one depend on no other: not on the size of the batch, its neighbours or the threads, to the
-        last bit.  A trajectory that fails has `success` False, a message, and nan where it did not
-        come.
+        Trajectories run on several threads, and in vector lanes with explicit methods if the scene
+        has no events, releases, twist springs and drives.  Each trajectory is bit for bit
+        independent of the others, of the size of the batch and of the threads.  A failed trajectory
+        has `success` False, a message, and nan after the failure.
 
-        Raises SceneError for settings, shapes or parameters that make no sense.
+        Raises SceneError for invalid settings, shapes or parameters.
         """
         from ..result.batch_result import BatchResult
         from ..run.batch.batch_run import prepare_batch, simulate_batch
@@ -399,10 +418,10 @@ class Model(LinearAnalysis, NotebookDisplay):
             tangent=tangent,
         )
         settings, q, u = prepare_batch(self, settings, initial_states)
-        found = simulate_batch(
+        run = simulate_batch(
             self, settings, q, u, {} if parameters is None else parameters, inputs, threads
         )
-        return BatchResult(**vars(found))
+        return BatchResult(**vars(run))
 
 
 __all__ = ["Model", "NumericalFailure"]

@@ -1,4 +1,4 @@
-"""Results out of files: their scenes are validated and compiled again."""
+"""Loading of results from files, whose scenes are validated and compiled again."""
 
 from __future__ import annotations
 
@@ -32,10 +32,12 @@ from .model import Model
 
 
 def load_result(path: str | Path) -> Result | ColumnFile:
-    """A result that was saved: of NetCDF with its scene compiled again, so that every quantity is
-    there; of CSV and MATLAB files (.csv, .mat) the columns, which can be drawn and compared.
+    """Load a saved result from a file.
 
-    Raises SceneError if the file is no such result, EnvironmentFailure if the extra io is missing.
+    From NetCDF with its scene compiled again, so that every quantity is available; from CSV and
+    MATLAB files (.csv, .mat) only the columns, which can be plotted and compared.
+
+    Raises SceneError if the file is not a result, EnvironmentFailure without the extra io.
     """
     path = require_path("result file", path)
     require_regular_file(path, "result file")
@@ -44,13 +46,13 @@ def load_result(path: str | Path) -> Result | ColumnFile:
         return load_netcdf(path)
     if not path.is_file():
         raise SceneError(f'result file "{path}": there is no such file')
-    found = reader(path)
-    found.lost = frozenset({*dir(Result), *Record.__annotations__}) - frozenset(dir(found))
-    return found
+    columns = reader(path)
+    columns.lost = frozenset({*dir(Result), *Record.__annotations__}) - frozenset(dir(columns))
+    return columns
 
 
 def load_netcdf(path: Path) -> Result:
-    """A result saved as NetCDF; see `load_result`."""
+    """Load a result saved as NetCDF; see `load_result`."""
     require_regular_file(path, "result file")
     try:
         import h5netcdf  # noqa: F401
@@ -59,12 +61,12 @@ def load_netcdf(path: Path) -> Result:
         raise missing_package_error("io", "a NetCDF file", error) from None
     if not path.is_file():
         raise SceneError(f'result file "{path}": there is no such file')
-    if seal_is_broken(path):  # before HDF5, which such a file may crash or occupy for ever
+    if seal_is_broken(path):  # before HDF5, which may crash or hang on such a file
         raise SceneError(
-            f'result file "{path}": it is damaged, or was changed since it was written; make it '
-            "again, or write what you changed to another file"
+            f'result file "{path}": file corrupt or modified; regenerate it, or save your changes '
+            "to another file"
         )
-    data = _read(xarray, path)
+    data = _read_dataset(xarray, path)
     if data.attrs.get("format") == BATCH_FORMAT:
         raise SceneError(
             f'result file "{path}": this is a batch of runs; open it as a Dataset: '
@@ -74,28 +76,30 @@ def load_netcdf(path: Path) -> Result:
         raise SceneError(f'result file "{path}": not a result of mstmm')
     try:
         if int(data.attrs["format_version"]) > provenance.FORMAT:
-            raise SceneError(f'result file "{path}": written by a newer mstmm; install that one')
-        return _rebuilt(data, path)
+            raise SceneError(
+                f'result file "{path}": written by a newer mstmm; install that version'
+            )
+        return _rebuild_result(data, path)
     except MstmmError as error:
         if str(path) in str(error):
             raise
         raise SceneError(f'result file "{path}": {error}') from None
-    except _NOT_OURS as error:
+    except _CORRUPT_DATA_ERRORS as error:
         raise SceneError(
-            f'result file "{path}": it was changed or damaged ({type(error).__name__}: {error}); '
-            "make it again"
+            f'result file "{path}": file corrupt or modified ({type(error).__name__}: {error}); '
+            "regenerate it"
         ) from None
 
 
-#: What numbers and texts raise that are not as they were written.
-_NOT_OURS = (KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
+#: Exceptions due to numbers and texts that differ from those written.
+_CORRUPT_DATA_ERRORS = (KeyError, ValueError, TypeError, AttributeError, IndexError, OverflowError)
 
 
-def _read(xarray: Any, path: Path) -> Any:
-    """All of a file.  SceneError for whatever the libraries make of one that is cut or overwritten.
+def _read_dataset(xarray: Any, path: Path) -> Any:
+    """Dataset of a file; raises SceneError for any error of the libraries in a corrupt file.
 
-    Objects of theirs that are given up half made complain, past every caller, as they go: they go
-    here, unheard.
+    Incomplete objects of the libraries report errors when they are deleted; they are deleted here,
+    with the reports suppressed.
     """
     previous, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
@@ -104,48 +108,52 @@ def _read(xarray: Any, path: Path) -> Any:
                 return file.load()
         except Exception as error:
             reason = str(error)
-        gc.collect()  # the exception, which held them, is gone
+        gc.collect()  # the exception no longer refers to them
     finally:
         sys.unraisablehook = previous
     raise SceneError(f'result file "{path}": not a NetCDF file ({reason})')
 
 
-def _completed(model: Model, run: Trajectory) -> Trajectory:
-    """The run with columns of memory that files had not until 2026-11-24: whether a step of a scene
-    with loops ended near a singular pose; and until 2026-11-29: which rows are at rest.  Nothing
-    went by these when they were made."""
+def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
+    """Run with the columns of memory that older files do not have, as zeros.
+
+    Until 2026-11-24: whether a step of a scene with loops ended near a singular pose; until
+    2026-11-29: which rows are at rest.  Older runs did not depend on them.
+    """
     system, rows = model.packed.system, run.memory
-    added = [system.strained] * (system.strained >= 0), [*system.chosen]
-    for places in (added[1], added[0] + added[1]):
+    missing = [system.strained] * (system.strained >= 0), [*system.chosen]
+    for places in (missing[1], missing[0] + missing[1]):
         if places and rows.ndim == 2 and rows.shape[1] == system.n_memory - len(places):
-            wide = np.zeros((len(rows), system.n_memory))
-            wide[:, np.setdiff1d(np.arange(system.n_memory), places)] = rows
-            return replace(run, memory=wide)
+            extended = np.zeros((len(rows), system.n_memory))
+            extended[:, np.setdiff1d(np.arange(system.n_memory), places)] = rows
+            return replace(run, memory=extended)
     return run
 
 
 def _fits(model: Model, run: Trajectory) -> bool:
-    """The sizes of every array follow from the scene and the number of samples."""
+    """Whether all arrays of a run have the sizes that the scene and the samples imply."""
     n, memory = len(run.t), model.packed.system.n_memory
     expected = {
         "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
     }  # fmt: skip
     states = [run.last[1:] if run.last is not None else None, run.start]
-    rows = all((q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states))
-    return rows and all(getattr(run, name).shape == shape for name, shape in expected.items())
+    states_fit = all(
+        (q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states)
+    )
+    return states_fit and all(getattr(run, name).shape == shape for name, shape in expected.items())
 
 
-def _rebuilt(data: Any, path: Path) -> Result:
-    """Scene and model as they were; what only the run knew comes from the file.
+def _rebuild_result(data: Any, path: Path) -> Result:
+    """Result of a saved run: scene and model compiled again, trajectory from the file.
 
-    Raises one of _NOT_OURS where numbers are missing or of another kind or size.
+    Raises one of _CORRUPT_DATA_ERRORS where numbers are missing or of another kind or size.
     """
     scene = Scene.from_data(tomllib.loads(str(data["scene"].item())), f"{path}: scene")
     elements, definitions = kernel_store.load_known(kernel_store.required_types(scene))
     scene.check_types(definitions)
     model = Model(scene, known=elements, sweep=data.attrs.get("sweep", "riccati"))
     model.fusion = NoFusedCode(f"the saved run was made by the {data.attrs['engine']} one")
-    run = _completed(model, provenance.read_trajectory(data))
+    run = _with_missing_memory(model, provenance.read_trajectory(data))
     if not _fits(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
     if data.attrs["kernels_sha256"] != kernels_hash(model.known):

@@ -1,4 +1,4 @@
-"""From a compiled scene to a result, by a run."""
+"""Simulation of a compiled scene: runs and their results."""
 
 from __future__ import annotations
 
@@ -31,28 +31,31 @@ def simulate(
     resume: bool,
     named: bool = True,
 ) -> Result:
-    """One run, and a second one where its error is asked for; see `Model.simulate`.  `seen` is what
-    a look at it has found; unless its method was `named`, a run by `auto` that has kept to its
-    first one is recorded as one by that."""
-    watch = RunMonitor(progress, settings, runs=2 if certify else 1, named=named)
+    """Result of one run, with an error estimate from a second one if `certify`.
+
+    See `Model.simulate`.  `seen` are the findings before the run.  Unless the user `named` the
+    method, a run by `auto` that keeps to its first method is recorded as one by that method.
+    """
+    monitor = RunMonitor(progress, settings, runs=2 if certify else 1, named=named)
     if checkpoint is not None:
-        watch.checkpoint = Checkpoint(require_path("checkpoint", checkpoint), model, settings, q, u)
-    run = first_run(model, settings, q, u, watch, resume)
+        path = require_path("checkpoint", checkpoint)
+        monitor.checkpoint = Checkpoint(path, model, settings, q, u)
+    run = first_run(model, settings, q, u, monitor, resume)
     run = seen.given(run, q, u)
-    error = second_run(model, run, q, u, watch) if certify and run.is_comparable else None
-    if watch.notes:
-        run = replace(run, notes=(*run.notes, *watch.notes))
+    error = second_run(model, run, q, u, monitor) if certify and run.is_comparable else None
+    if monitor.notes:
+        run = replace(run, notes=(*run.notes, *monitor.notes))
     result = result_of(model, run, error)
-    result.checkpoint = watch.checkpoint
+    result.checkpoint = monitor.checkpoint
     return result
 
 
 def certify_result(result: Result, progress: Callable[[float, float], None] | None) -> Result:
-    """The same result with its error estimated by a second, more accurate run from the start."""
-    run, watch = result.trajectory, RunMonitor(progress, result.settings, runs=2)
+    """Result with its error estimated by a second, more accurate run from the start."""
+    run, monitor = result.trajectory, RunMonitor(progress, result.settings, runs=2)
     _, q, u = run.first
-    error = second_run(result.model, run, q, u, watch)
-    noted = replace(run, notes=(*run.notes, *watch.notes))
-    made = result_of(result.model, noted, error)
-    made.checkpoint = result.checkpoint
-    return made
+    error = second_run(result.model, run, q, u, monitor)
+    run_with_notes = replace(run, notes=(*run.notes, *monitor.notes))
+    certified = result_of(result.model, run_with_notes, error)
+    certified.checkpoint = result.checkpoint
+    return certified

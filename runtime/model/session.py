@@ -1,4 +1,4 @@
-"""A session: a model that is taken forward tick by tick, its inputs set in between."""
+"""A session: a simulation that the caller advances step by step, with inputs set in between."""
 
 from __future__ import annotations
 
@@ -35,26 +35,26 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..result.result import Result
 
-#: Rows for samples, which only events leave and nobody reads.
-_ROWS = 4
-#: Known times reach so many ticks ahead at first, then as far again as the session has come.
-_AHEAD = 64.0
-#: Steps over which a motion that a fixed step makes grow is taken to show.
-_MANY = 1000
+#: Rows for samples; only events write them, and they are not read.
+_SAMPLE_ROWS = 4
+#: The time map covers this many ticks ahead at first, then as much as the time elapsed.
+_LOOKAHEAD_TICKS = 64.0
+#: Number of steps over which the stability of a fixed step is checked.
+_CHECKED_STEPS = 1000
 
 
 class Session:
-    """A run in the caller's hands, made by `Model.session`.
+    """A run that the caller advances; created by `Model.session`.
 
-    `advance` goes on in time under the inputs it is given, which stay what they are until they are
-    given anew.  With fixed steps and unchanged inputs the states are bit for bit those of one
-    `simulate` with these steps on the same engine, however the time is cut; where a tick ends
-    between two steps the step is cut there, as at a break.  Methods that choose their steps end one
-    at every tick: their states agree within the tolerance.
+    `advance` integrates over a tick with given inputs, which stay constant until changed.  With
+    fixed steps and unchanged inputs the states are bit for bit those of one `simulate` with these
+    steps on the same engine, for any ticks that are multiples of the step; other ticks shorten a
+    step at their end.  Methods with adaptive steps end a step at every tick: their states agree
+    within the tolerance.
 
     Attributes:
-        model: the model at the session's start.
-        settings: how its steps are made.
+        model: the model at the start of the session.
+        settings: method and steps.
     """
 
     def __init__(
@@ -65,199 +65,206 @@ class Session:
         u: Array,
         risks: tuple[Risk, ...] = (),
     ) -> None:
-        refuse_method(settings)
+        check_method(settings)
         refuse_one_way(model.packed, "a session")
         self.model, self.settings, self._risks = model, settings, risks
-        self._names = settable(model)
+        self._names = settable_inputs(model)
         self._packed = with_held_inputs(model.packed, self._names, settings.t_start)
         self._code = for_many(model, settings)
         self._outputs: MeasuredOutputs | None = MeasuredOutputs(LoopedEngine(self._packed))
-        self._make(q, u, -math.inf if self._packed.goes_by_time else math.inf)
+        self._start_run(q, u, -math.inf if self._packed.goes_by_time else math.inf)
 
-    def _make(self, q: Array, u: Array, reach: float) -> None:
-        """A run that starts; before `reach` (s) its breaks are known."""
+    def _start_run(self, q: Array, u: Array, reach: float) -> None:
+        """Start the integrator at (q, u); its breaks are known up to `reach` (s)."""
         engine = LoopedEngine(self._packed)
         system = self._system = SceneSystem(engine, self._code)
-        self._run: Integrator = make_run(system, self.settings, q, u, _ROWS)
-        self._settles = settles(engine)
+        self._run: Integrator = make_run(system, self.settings, q, u, _SAMPLE_ROWS)
+        self._needs_projection = settles(engine)
         ffi, n = engine.ffi, len(self._names)
-        self._places = {name: k for k, name in enumerate(self._names)}
-        self._given = ffi.new("double[]", list(self._held()) or [0.0])
+        self._indices = {name: k for k, name in enumerate(self._names)}
+        self._new_inputs = ffi.new("double[]", list(self._input_values()) or [0.0])
         record = self._record = ffi.new("mstmm_session *")
         record.scene, record.run, record.reach = system.run, self._run.record, reach
-        record.n, record.given = n, self._given
-        self._memory = engine.pointer(self._held()) if n else ffi.NULL
-        record.held = self._memory
+        record.n, record.given = n, self._new_inputs
+        self._input_memory = engine.pointer(self._input_values()) if n else ffi.NULL
+        record.held = self._input_memory
         self._advance = engine.lib.mstmm_session_advance
 
-    # --- on in time -----------------------------------------------------------------------------
+    # --- advance --------------------------------------------------------------------------------
 
     def advance(self, dt: float, inputs: Mapping[str, float] | None = None) -> None:
-        """On by `dt` (s, 0 or more) with `inputs` at these numbers from now on, by their names.
+        """Advance by `dt` (s, 0 or more) with constant `inputs`, given by name.
 
-        Raises SceneError, with nothing changed, for a time or an input that makes no sense and
-        behind an event that has ended the session.  NumericalFailure where the motion ends: the
-        session then stands at the last good state, and may go on from there with other inputs.
+        Inputs stay constant until changed.  Raises SceneError, without any change, for an invalid
+        time or input and after an event that has ended the session.  Raises NumericalFailure if the
+        integration fails: the session is then at the last valid state, and may continue from there
+        with other inputs.
         """
         if inputs:
-            given, places = self._given, self._places
+            values, indices = self._new_inputs, self._indices
             try:
                 for name in inputs:
-                    given[places[name]] = inputs[name]
+                    values[indices[name]] = inputs[name]
             except (KeyError, IndexError, TypeError, ValueError, OverflowError):
-                raise self._refused_input(inputs) from None
+                raise self._input_rejection(inputs) from None
         try:
             status = self._advance(self._record, dt, SLICE)
         except (TypeError, OverflowError):
-            raise self._refused(-1, dt) from None
+            raise self._rejection(-1, dt) from None
         if status != Status.FINISHED:
-            self._otherwise(status, dt)
+            self._handle_status(status, dt)
 
-    def _otherwise(self, status: int, dt: float) -> None:
-        """What there is to do where a call did not simply reach its end."""
+    def _handle_status(self, status: int, dt: float) -> None:
+        """Continue, or raise the error, after a call that did not reach its end."""
         lib = self._system.engine.lib
         while status in (Status.RUNNING, lib.MSTMM_UNMAPPED):
-            if status == Status.RUNNING:  # between two of these Python looks for interrupts
+            if status == Status.RUNNING:  # Python handles interrupts between calls
                 status = lib.mstmm_session_rest(self._record, SLICE)
             else:
-                self._look_ahead(float(dt))
+                self._update_time_map(float(dt))
                 status = self._advance(self._record, dt, SLICE)
         if status == lib.MSTMM_REFUSED:
-            raise self._refused(int(self._record.refused), dt)
+            raise self._rejection(int(self._record.refused), dt)
         if status < 0:
-            raise NumericalFailure(self._failure())
+            raise NumericalFailure(self._failure_message())
 
-    def _refused(self, which: int, dt: object) -> SceneError:
-        """Why nothing was done; what was given is forgotten."""
-        value = float(self._given[which]) if which >= 0 else 0.0
-        self._forget_given()
-        if which >= 0:
-            return SceneError(f'inputs["{self._names[which]}"] = {value}: expected a finite number')
-        if which == -1:
+    def _rejection(self, index: int, dt: object) -> SceneError:
+        """Error of a rejected call; new inputs are reset."""
+        value = float(self._new_inputs[index]) if index >= 0 else 0.0
+        self._reset_new_inputs()
+        if index >= 0:
+            return SceneError(f'inputs["{self._names[index]}"] = {value}: expected a finite number')
+        if index == -1:
             return SceneError(f"dt = {dt!r}: expected a time in s, 0 or more")
-        return SceneError(f"the session was {self.stopped}; make a new one, or keep a copy before")
+        return SceneError(f"the session was {self.stopped}; make a new one, or copy it before")
 
-    def _refused_input(self, inputs: Any) -> SceneError:
-        self._forget_given()
+    def _input_rejection(self, inputs: Any) -> SceneError:
+        self._reset_new_inputs()
         for name, value in mapping_by_name("inputs", inputs).items():
-            if name not in self._places:
-                return SceneError(not_settable(self.model, name, self._names))
+            if name not in self._indices:
+                return SceneError(unsettable_reason(self.model, name, self._names))
             finite_float(f'inputs["{name}"]', value)
-        return SceneError(f"inputs = {inputs!r}: expected finite numbers by their names")
+        return SceneError(f"inputs = {inputs!r}: expected finite numbers by name")
 
-    def _forget_given(self) -> None:
-        for k, value in enumerate(self._held()):
-            self._given[k] = value
+    def _reset_new_inputs(self) -> None:
+        for k, value in enumerate(self._input_values()):
+            self._new_inputs[k] = value
 
-    def _failure(self) -> str:
-        """How the motion ended, told with the inputs as they are."""
+    def _failure_message(self) -> str:
+        """Message of a failure, with the current inputs."""
         system = shallow(self._system)
-        system.engine = self._now().looped
+        system.engine = self._current_model().looped
         return message_of(system, self._run)
 
-    def _look_ahead(self, dt: float) -> None:
-        """Finds the times that steps have to look out for, up to behind the end of this tick."""
+    def _update_time_map(self, dt: float) -> None:
+        """Compute breaks and short signals beyond the end of this tick."""
         start = self.t
-        end = start + max(_AHEAD * dt, start - self.settings.t_start)
+        end = start + max(_LOOKAHEAD_TICKS * dt, start - self.settings.t_start)
         try:
-            known = self._packed.time_map(start, end)
+            time_map = self._packed.time_map(start, end)
         except SceneError:
-            self._forget_given()
+            self._reset_new_inputs()
             raise
-        self._run.map_times(known.breaks, (known.starts, known.longest), known.pole)
+        self._run.map_times(time_map.breaks, (time_map.starts, time_map.longest), time_map.pole)
         self._record.reach = end
 
-    # --- where it is ----------------------------------------------------------------------------
+    # --- current state --------------------------------------------------------------------------
 
     @property
     def t(self) -> float:
-        """The time, s."""
+        """Time, s."""
         return self._run.t
 
     @property
     def state(self) -> tuple[Array, Array]:
-        """(nq,), (nu,): both `q` and `u`, as `initial` takes them."""
-        y, nq = self._state(), self.model.nq
+        """State (q (nq,), u (nu,)), as for `initial`."""
+        y, nq = self._projected_state(), self.model.nq
         return y[:nq], y[nq : nq + self.model.nu]
 
     @property
     def q(self) -> Array:
-        """(nq,) hinge coordinates; m, rad, unit quaternions."""
-        return self._state()[: self.model.nq]
+        """Coordinates (nq,); m, rad, unit quaternions."""
+        return self._projected_state()[: self.model.nq]
 
     @property
     def u(self) -> Array:
-        """(nu,) hinge speeds; m/s, rad/s."""
+        """Speeds (nu,); m/s, rad/s."""
         nq = self.model.nq
-        return self._state()[nq : nq + self.model.nu]
+        return self._projected_state()[nq : nq + self.model.nu]
 
-    def _state(self) -> Array:
-        """The state as the samples of a result have it."""
+    def _projected_state(self) -> Array:
+        """State as in the samples of a result: projected onto the constraints."""
         y = self._run.y
-        if not self._settles:
+        if not self._needs_projection:
             return y
         t = np.array([self.t])
         return project_samples(self._system, t, y[None], self._system.memory[None])[0][0]
 
     @property
     def risks(self) -> tuple[Risk, ...]:
-        """What speaks against the fixed step; conditions that may have held unseen."""
-        missed = self._run.unseen
-        return self._risks if missed is None else (*self._risks, unseen(self._system, *missed))
+        """Objections to the fixed step, and to conditions of events that may have been missed."""
+        unseen_condition = self._run.unseen
+        return (
+            self._risks
+            if unseen_condition is None
+            else (*self._risks, unseen(self._system, *unseen_condition))
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The risks, one sentence each."""
+        """Risks as sentences."""
         return sentences(self.risks)
 
     @property
     def inputs(self) -> dict[str, float]:
-        """What the inputs that can be set are now, by their names."""
-        return dict(zip(self._names, map(float, self._held()), strict=True))
+        """Current values of the inputs that can be set, by name."""
+        return dict(zip(self._names, map(float, self._input_values()), strict=True))
 
     @property
     def stopped(self) -> str:
-        """How an event ended the session, in words; "" while it goes on."""
+        """Reason why an event ended the session; "" while it runs."""
         return message_of(self._system, self._run) if self._run.status is Status.STOPPED else ""
 
     def outputs(self) -> dict[str, Any]:
-        """The outputs of the scene at this state, by their names: numbers, or arrays of vectors."""
+        """Outputs of the scene at the current state by name: numbers, or arrays for vectors."""
         if self._outputs is None:
             self._outputs = MeasuredOutputs(self._system.engine)
-        found = self._outputs.at(self._system.run, self.t, self._state())
+        values = self._outputs.at(self._system.run, self.t, self._projected_state())
         if self._outputs.others:
-            shown = self.result().outputs()
-            found |= {name: shown[name][0] for name in self._outputs.others if name in shown}
-        return found
+            quantities = self.result().outputs()
+            values |= {
+                name: quantities[name][0] for name in self._outputs.others if name in quantities
+            }
+        return values
 
     def result(self) -> Result:
-        """This state as a result of one sample, which knows every quantity of the scene."""
-        model, run = self._now(), self._run
+        """Current state as a result of one sample, with all quantities of the scene."""
+        model, run = self._current_model(), self._run
         memory = self._system.memory[None, : model.packed.system.n_memory].copy()
         samples = Samples(np.array([run.t]), run.y[None], memory, np.zeros(1, dtype=np.int64))
         settings = replace(self.settings, t_end=run.t, output_times=None)
-        found = split(
+        trajectory = split(
             self._system, samples, settings, Status.FINISHED, message_of(self._system, run),
             run.statistics, (run.t, run.y),
         )  # fmt: skip
-        return result_of(model, found)
+        return result_of(model, trajectory)
 
-    def _held(self) -> Array:
-        """What the inputs that can be set are."""
+    def _input_values(self) -> Array:
+        """Values of the inputs that can be set, a view of the memory."""
         memory, n = self._system.memory, len(self._names)
         return memory[len(memory) - n :]
 
-    def _now(self) -> CompiledScene:
-        """The model under the inputs of now."""
+    def _current_model(self) -> CompiledScene:
+        """Model with the current inputs."""
         return self.model.renewed(with_input_values(self.model.packed, self.inputs))
 
     def copy(self) -> Self:
-        """A session of its own that stands where this one does, and goes on alike."""
+        """Independent session at the same state, with the same settings and inputs."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__, _outputs=None)
-        other._make(self.q, self.u, float(self._record.reach))
+        other._start_run(self.q, self.u, float(self._record.reach))
         other._run.take_over(self._run)
-        other._forget_given()
+        other._reset_new_inputs()
         return other
 
     __copy__ = copy
@@ -267,8 +274,8 @@ class Session:
 
     def __reduce__(self) -> Never:
         raise SceneError(
-            "a session stays in its process and is not pickled; keep its model, t and state, and "
-            "begin another with model.session(q, u, t)"
+            "sessions cannot be pickled; pickle model, t and state, and start another one with "
+            "model.session(q, u, t)"
         )
 
     def __repr__(self) -> str:
@@ -276,45 +283,52 @@ class Session:
 
 
 def step_risks(model: CompiledScene, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
-    """What speaks against a fixed step over as many as a session will make, from (nq,), (nu,)."""
-    refuse_method(settings)
+    """Objections to a fixed step of a session that starts at q (nq,), u (nu,)."""
+    check_method(settings)
     assert settings.step is not None
-    long = replace(settings, t_end=settings.t_start + _MANY * settings.step)
-    found = check_step(model.looped, long, q, u)
-    return () if found is None or found.risk is None else (found.risk,)
+    long_run = replace(settings, t_end=settings.t_start + _CHECKED_STEPS * settings.step)
+    check = check_step(model.looped, long_run, q, u)
+    return () if check is None or check.risk is None else (check.risk,)
 
 
-def refuse_method(settings: Settings) -> None:
-    """SceneError for methods that make whole runs."""
+def check_method(settings: Settings) -> None:
+    """Raise SceneError for methods that only make whole runs."""
     if settings.method in (AUTO, *external_integrators.METHODS, *classical_run.METHODS):
         raise SceneError(
-            f'method "{settings.method}" makes whole runs: use simulate, or for a session a method '
-            "such as rk4 (with step), dop853, rodas5p or genalpha"
+            f'method "{settings.method}" only makes whole runs: use simulate, or a method for '
+            "sessions such as rk4 (with step), dop853, rodas5p or genalpha"
         )
 
 
-def settable(model: CompiledScene) -> tuple[str, ...]:
-    """The inputs that may be set while a model moves: those that nothing is driven by, that no
-    controller sets, and that do not go by time."""
-    driving = {name for one in active_expressions(model.scene) if one.drive for name in one.inputs}
-    moving = {name for name, number in model.packed.channels.items() if not number.stands}
-    taken = {*driving, *model.scene.controlled, *moving}
-    return tuple(one.name for one in model.scene.input if one.name not in taken)
+def settable_inputs(model: CompiledScene) -> tuple[str, ...]:
+    """Names of the inputs that can be set during a session.
+
+    Without those that drive coordinates, are set by a controller, or depend on time.
+    """
+    drives = [active for active in active_expressions(model.scene) if active.drive]
+    drive_inputs = {name for active in drives for name in active.inputs}
+    time_dependent = {name for name, number in model.packed.channels.items() if not number.stands}
+    excluded = {*drive_inputs, *model.scene.controlled, *time_dependent}
+    return tuple(entry.name for entry in model.scene.input if entry.name not in excluded)
 
 
-def not_settable(model: CompiledScene, name: str, names: Sequence[str]) -> str:
-    """Why an input cannot be set while a model moves."""
+def unsettable_reason(model: CompiledScene, name: str, names: Sequence[str]) -> str:
+    """Message why an input cannot be set during a session."""
     if name in model.scene.controlled:
         return f'inputs["{name}"]: controller "{model.scene.controlled[name]}" sets this input'
-    for one in active_expressions(model.scene):
-        if one.drive and name in one.inputs and any(i.name == name for i in model.scene.input):
+    for active in active_expressions(model.scene):
+        if (
+            active.drive
+            and name in active.inputs
+            and any(i.name == name for i in model.scene.input)
+        ):
             return (
-                f'inputs["{name}"]: the {one.what} follows this input, and a drive that jumps is a '
-                "blow; give it with its rates or as a signal before the session, by with_inputs"
+                f'inputs["{name}"]: the {active.what} follows this input, and a jump of a drive is '
+                "an impact; set its rates or a signal before the session, by with_inputs"
             )
-    if any(one.name == name for one in model.scene.input):
+    if any(entry.name == name for entry in model.scene.input):
         return (
-            f'inputs["{name}"]: this input goes by time, by a signal or by its rates; give it a '
+            f'inputs["{name}"]: this input depends on time, by a signal or by its rates; give it a '
             "number before the session, by with_inputs, to set it"
         )
     return f'inputs["{name}"]: there is no such input in the scene{did_you_mean(name, names)}'

@@ -1,7 +1,7 @@
-"""What a compiled scene answers about single states, or many: dynamics and its derivatives.
+"""Dynamics of a compiled scene at single states or batches, and derivatives.
 
-Every call takes one state or leading axes of them, checks their shapes, and writes into `out`
-where one is given: a float64 array of the answer's shape, which is handed back.
+Every call takes one state or states with leading axes, and checks their shapes.  It writes into
+`out`, if given, a float64 array of the shape of the answer, which is returned.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class DynamicsQueries(KinematicQueries):
-    """A compiled scene, and its dynamics at states."""
+    """Compiled scene with dynamics at given states."""
 
     def accelerations(
         self,
@@ -40,23 +40,23 @@ class DynamicsQueries(KinematicQueries):
         threads: int | None = None,
         out: Array | None = None,
     ) -> Array:
-        """udot (..., nu) from q (..., nq), u (..., nu), t (s) and extra efforts (..., nu; N, N*m).
+        """Accelerations udot (..., nu) at q (..., nq), u (..., nu) and t (s).
 
-        Driven coordinates take the drive's value whatever q and u say.  A batch (leading axes) goes
-        through vector lanes where there is fused code, and through `threads` threads (None: as many
-        as there are processors); with one engine a state's numbers depend neither on the batch
-        around it nor on the threads, to the last bit.
+        `efforts` (..., nu; N, N*m) act in addition.  Driven coordinates have the values of their
+        drives, whatever q and u are.  A batch (leading axes) uses vector lanes if there is fused
+        code, and `threads` threads (None: the number of processors); with one engine the
+        result of a state is bit for bit independent of the batch and of the threads.
 
-        Raises SceneError for a shape that does not fit, NumericalFailure naming the state and the
-        hinge whose motion is undetermined.
+        Raises SceneError for a wrong shape, NumericalFailure naming the state and the hinge whose
+        motion is undetermined.
         """
         if threads is None:
-            alone = self._alone
-            if alone.library is not self.fusion.library:
-                alone.renew()
-            found: Array | None = alone.accelerations(t, q, u, efforts)
-            if found is not None:
-                return found if out is None else copy_to(out, found)
+            calls = self._single_state
+            if calls.library is not self.fusion.library:
+                calls.renew()
+            single: Array | None = calls.accelerations(t, q, u, efforts)
+            if single is not None:
+                return single if out is None else copy_to(out, single)
         from ..engine.state_evaluation.state_batch import StateBatch, accelerations
 
         extra = () if efforts is None else (("efforts", efforts, self.nu),)
@@ -75,31 +75,33 @@ class DynamicsQueries(KinematicQueries):
         actuators: Sequence[str] | None = None,
         out: Array | None = None,
     ) -> Array:
-        """Efforts (..., nu) beyond the laws' own that give `udot`; for driven coordinates the
-        drive's.  q (..., nq), u and udot (..., nu), t (s).
+        """Efforts (..., nu) in addition to hinge laws that give `udot`; drive efforts where driven.
 
-        Where loops are closed, `actuators` are what acts: hinges, or efforts of some of their
-        speeds ("shoulder.effort"), as many as the mechanism has motions; the efforts of all others
-        are zero.  Without, they are `loops.independent`.  udot may be that of these independent
-        speeds alone, (..., mobility); all of it must go with the loops.
+        q (..., nq), u and udot (..., nu), t (s).  With closed loops, `actuators` are hinges, or
+        efforts of some of their speeds ("shoulder.effort"), as many as the mobility; all other
+        efforts are zero.  By default they are `loops.independent`.  udot may be that of the
+        independent speeds alone, (..., mobility); a complete udot must satisfy the constraints.
 
-        Newton-Euler inverse dynamics over the tree, O(bodies), and a sweep more for each motion of
-        a mechanism.  Raises SceneError for a shape that does not fit, accelerations that tear a
-        loop, and actuators that are not as many as the motions; NumericalFailure where they do not
-        decide them at the state.
+        Newton-Euler inverse dynamics over the tree, O(bodies), and one more sweep per degree of
+        freedom of a mechanism.  Raises SceneError for a wrong shape, accelerations that open a
+        loop, and a number of actuators other than the mobility; NumericalFailure if they cannot
+        drive all motions at the state.
         """
         if self.freedom is not None:
             from .constrained_inverse_dynamics import constrained_inverse_dynamics
 
             return copy_to(out, constrained_inverse_dynamics(self, q, u, udot, t, actuators))
         if actuators is not None:
-            raise SceneError("actuators: no loop is closed in this scene, so that all speeds act")
-        alone = self._alone
-        if alone.inverse is None or alone.inverse is not self.fusion.inverse:
-            alone.seek()
-        found: Array | None = alone.efforts(t, q, u, udot)
-        if found is not None:
-            return found if out is None else copy_to(out, found)
+            raise SceneError(
+                "actuators: expected a scene with closed loops, found a tree, where all speeds "
+                "act; leave actuators out"
+            )
+        calls = self._single_state
+        if calls.inverse is None or calls.inverse is not self.fusion.inverse:
+            calls.seek()
+        single: Array | None = calls.efforts(t, q, u, udot)
+        if single is not None:
+            return single if out is None else copy_to(out, single)
         engine = self.looped
         memory, nu = engine.start_memory(), self.nu
         lead, (times, coordinates, speeds, rates) = batch(
@@ -107,18 +109,18 @@ class DynamicsQueries(KinematicQueries):
         )
         rows = np.empty((len(times), nu))
         states = zip(times.tolist(), coordinates, speeds, rates, strict=True)
-        for k, (at, a, b, c) in enumerate(states):
-            found = alone.efforts(at, a, b, c)
-            rows[k] = engine.inverse_dynamics(at, a, b, c, memory) if found is None else found
+        for k, (time, a, b, c) in enumerate(states):
+            single = calls.efforts(time, a, b, c)
+            rows[k] = engine.inverse_dynamics(time, a, b, c, memory) if single is None else single
         return copy_to(out, rows.reshape(*lead, nu))
 
     def bias(
         self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0, *, out: Array | None = None
     ) -> Array:
-        """h (..., nu) of M(q) udot + h = efforts: what holds all speeds steady against gravity,
-        laws, loads and turning axes; where loops are closed (..., mobility), as `mass_matrix`.
+        """Bias force h (..., nu) of M(q) udot + h = efforts; (..., mobility) with closed loops.
 
-        Raises what `inverse_dynamics` raises.
+        From gravity, hinge laws, loads and gyroscopic terms.  Raises what `inverse_dynamics`
+        raises.
         """
         if self.freedom is None:
             return self.inverse_dynamics(q, u, np.zeros(self.nu), t, out=out)
@@ -126,54 +128,54 @@ class DynamicsQueries(KinematicQueries):
         return copy_to(out, self.inverse_dynamics(q, u, np.zeros(len(places)), t)[..., places])
 
     def gravity_efforts(self, q: ArrayLike, *, out: Array | None = None) -> Array:
-        """Efforts (..., nu) that hold the scene at rest against gravity alone, laws, loads and
-        drives left out; where loops are closed (..., mobility), as `mass_matrix`.
+        """Efforts (..., nu) in equilibrium with gravity alone; (..., mobility) with closed loops.
 
-        Raises SceneError for a shape that does not fit, NumericalFailure where the independent
-        speeds do not decide the others.
+        Without hinge laws, loads and drives.  Raises SceneError for a wrong shape, NumericalFailure
+        if the independent speeds do not determine the others.
         """
         if self.freedom is None and not self.layout.modal:
-            alone: Array | None = self._held.efforts(0.0, q, *self._still)
-            if alone is not None:
-                return alone if out is None else copy_to(out, alone)
+            single: Array | None = self._gravity_calls.efforts(0.0, q, *self._zero_speeds)
+            if single is not None:
+                return single if out is None else copy_to(out, single)
         lead, (states,) = batch(("q", q, self.nq))
-        found = np.array([self._against_gravity(one_state) for one_state in states])
-        return copy_to(out, found.reshape(*lead, *found.shape[1:]))
+        rows = np.array([self._gravity_efforts_at(state) for state in states])
+        return copy_to(out, rows.reshape(*lead, *rows.shape[1:]))
 
-    def _against_gravity(self, q: Array) -> Array:
-        still, memory = self._still[0], self.looped.start_memory()
-        found, strained = (
-            engine.inverse_dynamics(0.0, q, still, still, memory)
+    def _gravity_efforts_at(self, q: Array) -> Array:
+        zeros, memory = self._zero_speeds[0], self.looped.start_memory()
+        with_gravity, without_gravity = (
+            engine.inverse_dynamics(0.0, q, zeros, zeros, memory)
             for engine in (self.looped.weighed, self.looped.inertia_alone)
         )
         if self.freedom is None:
-            return found - strained
-        return self.freedom.following(q, self.freedom.places).T @ (found - strained)
+            return with_gravity - without_gravity
+        return self.freedom.following(q, self.freedom.places).T @ (with_gravity - without_gravity)
 
     @cached_property
-    def _still(self) -> tuple[Array, Array]:
+    def _zero_speeds(self) -> tuple[Array, Array]:
         return np.zeros(self.nu), np.zeros(self.nu)
 
     @cached_property
-    def _held(self) -> SingleStateCalls:
+    def _gravity_calls(self) -> SingleStateCalls:
         from ..engine.fused_code import NoFusedCode
         from ..engine.state_evaluation.single_state import SingleStateCalls
 
         return SingleStateCalls(self.looped.weighed, NoFusedCode())
 
     def mass_matrix(self, q: ArrayLike, *, out: Array | None = None) -> Array:
-        """Symmetric (..., nu, nu) mass matrix at q (..., nq), kg, kg*m, kg*m2; driven coordinates
-        as if free.  Where loops are closed it is that of the independent speeds alone, (...,
-        mobility, mobility) in the order of `loops.independent`, driven ones left out.
+        """Symmetric mass matrix (..., nu, nu) at q (..., nq), kg, kg*m, kg*m2.
 
-        Raises SceneError for a shape that does not fit, NumericalFailure where the independent
-        speeds do not decide the others.
+        Driven coordinates count as free.  With closed loops it is that of the independent speeds,
+        (..., mobility, mobility) in the order of `loops.independent`, without driven ones.
+
+        Raises SceneError for a wrong shape, NumericalFailure if the independent speeds do not
+        determine the others.
         """
         if self.freedom is None:
-            alone = self._alone
-            if alone.inverse is None or alone.inverse is not self.fusion.inverse:
-                alone.seek()
-            matrix: Array | None = alone.mass(q)
+            calls = self._single_state
+            if calls.inverse is None or calls.inverse is not self.fusion.inverse:
+                calls.seek()
+            matrix: Array | None = calls.mass(q)
             if matrix is not None:
                 return matrix if out is None else copy_to(out, matrix)
             refuse_dense(self.nu, "the mass matrix")
@@ -181,31 +183,31 @@ class DynamicsQueries(KinematicQueries):
         if self.freedom is not None:
             from .constrained_inverse_dynamics import reduced_mass
 
-            found = np.array([reduced_mass(self, one_state) for one_state in states])
-            return copy_to(out, found.reshape(*lead, *found.shape[1:]))
+            reduced = np.array([reduced_mass(self, state) for state in states])
+            return copy_to(out, reduced.reshape(*lead, *reduced.shape[1:]))
         rows = np.empty((len(states), self.nu, self.nu))
-        for k, one_state in enumerate(states):
-            matrix = alone.mass(one_state)
-            rows[k] = self.looped.mass_matrix(one_state) if matrix is None else matrix
+        for k, state in enumerate(states):
+            matrix = calls.mass(state)
+            rows[k] = self.looped.mass_matrix(state) if matrix is None else matrix
         return copy_to(out, rows.reshape(*lead, self.nu, self.nu))
 
     def solve(self, q: ArrayLike, rhs: ArrayLike, *, out: Array | None = None) -> Array:
-        """M(q)^-1 rhs: accelerations (..., nu) or (..., nu, k) that efforts rhs alone give.
+        """Accelerations M(q)^-1 rhs (..., nu) or (..., nu, k) due to the efforts rhs alone.
 
         q (..., nq); rhs (nu,), one column for all states, or (..., nu, k), k columns (N, N*m), as
-        `numpy.linalg.solve` has it.  M is never formed: the tree is factored once per state, and
-        each column is O(bodies).  Speeds that a drive or a hold imposes, released later or not,
-        stay unaccelerated: their rows of rhs are not read and their answers are zero.
+        in `numpy.linalg.solve`.  M is never formed: the tree is factorised once per state, and each
+        column is O(bodies).  Driven and fixed speeds, also those released later, have no
+        acceleration: their rows of rhs are ignored and their answers are zero.
 
-        Raises SceneError for a shape that does not fit, NumericalFailure naming the hinge whose
-        motion is undetermined.
+        Raises SceneError for a wrong shape, NumericalFailure naming the hinge whose motion is
+        undetermined.
         """
-        alone, columns = columns_of("rhs", rhs, self.nu)
+        is_single, columns = columns_of("rhs", rhs, self.nu)
         k = columns.shape[-1]
         lead, (states, columns) = batch(("q", q, self.nq), ("rhs", columns, (self.nu, k)))
         answers = self._solver.solve(states, np.ascontiguousarray(columns.swapaxes(-1, -2)))
-        found = answers.swapaxes(-1, -2).reshape(*lead, self.nu, k)
-        return copy_to(out, np.ascontiguousarray(found[..., 0] if alone else found))
+        solutions = answers.swapaxes(-1, -2).reshape(*lead, self.nu, k)
+        return copy_to(out, np.ascontiguousarray(solutions[..., 0] if is_single else solutions))
 
     @cached_property
     def _solver(self) -> MassMatrixSolver:
@@ -222,17 +224,17 @@ class DynamicsQueries(KinematicQueries):
         parameters: Sequence[str] = (),
         out: Derivatives | None = None,
     ) -> Derivatives:
-        """Exact derivatives of the accelerations by q, u, efforts, t and named numbers.
+        """Exact derivatives of the accelerations by q, u, efforts, t and named parameters.
 
         Arguments as for `accelerations`; `parameters` are names as in `with_parameters`.  With
         respect to q: nu tangent increments dphi, dq = N(q) dphi where qdot = N(q) u (rotation
-        vectors in outboard axes for quaternions).  No compiler is needed.  `out` is what an
-        earlier call gave, whose arrays are written into and which is returned.
+        vectors in outboard axes for quaternions).  No compiler is needed.  `out` is the result of
+        an earlier call, whose arrays are overwritten and which is returned.
 
-        Raises SceneError for a name that the scene does not have and for scenes with releases,
-        NumericalFailure where `accelerations` does and where a derivative does not exist.
+        Raises SceneError for an unknown name and for scenes with releases, NumericalFailure where
+        `accelerations` does and where a derivative does not exist.
         """
         names = require_texts("parameters", parameters, "rod1.mass")
-        by = self._differentiations.get(names) or self._differentiated_by(names)
-        found = by(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
+        differentiation = self._differentiations.get(names) or self._differentiation(names)
+        found = differentiation(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
         return found if out is None else found.kept_in(out)

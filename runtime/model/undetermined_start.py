@@ -1,8 +1,8 @@
-"""Starts whose motion the masses leave undetermined: every hinge concerned, and what would help.
+"""Rejection of starts with motions that have no inertia, with all hinges concerned.
 
-The sweep stops at the first hinge whose motion moves no inertia.  Given a rotor's inertia there it
-goes on to the next, which is both how all of them are found and the remedy that is named: what
-moves no inertia passes nothing inwards, so that the rotor changes nothing for the others.
+The sweep stops at the first hinge whose motion moves no inertia.  With a trial rotor there it goes
+on to the next one, which finds all of them.  A motion without inertia transmits nothing inboard, so
+that the rotor does not change the others.  Rotor inertia is also the remedy that is suggested.
 """
 
 from __future__ import annotations
@@ -19,47 +19,47 @@ if TYPE_CHECKING:
     from ..engine.looped_engine import LoopedEngine
 
 
-#: Hinges that are looked for, and that are named, at most.
-_MOST, _NAMED = 50, 8
+#: Largest number of hinges that are searched for, and that a message lists.
+_MAX_HINGES, _MAX_NAMES = 50, 8
 
 
 def refuse_undetermined_start(model: CompiledScene, q: Array, u: Array) -> None:
-    """SceneError naming the hinges if the masses leave motions of the start undetermined."""
+    """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
     engine = model.looped
     start = (q[None].copy(), u[None].copy(), engine.start_memory()[None].copy())
     try:
         engine.accelerations(0.0, *start)
     except UndeterminedMotionError as error:
-        places, said = _concerned(engine, error, start), str(error)
+        places, message = _undetermined_hinges(engine, error, start), str(error)
     except NumericalFailure:
-        return  # not a matter of masses: reported by whoever computes there
+        return  # another cause: reported by later computations at this state
     else:
         return
     if len(places) > 1:
-        said = (
-            f"{_listed([engine.hinge_name(k) for k in sorted(places)])} at t = 0 s: motions of "
-            "them are undetermined, because what they carry has no positive inertia in that "
-            "direction (thin rods on balls, point masses, collinear axes, three angles at their "
-            "lock, negative principal moments); give the bodies inertia, give the hinges rotor "
-            "inertia (law.inertia), fix those motions, or take ball hinges for three angles"
+        message = (
+            f"{_list_hinges([engine.hinge_name(k) for k in sorted(places)])} at t = 0 s: motions "
+            "are undetermined, because the outboard bodies have no positive inertia along them "
+            "(thin rods on ball hinges, point masses, collinear axes, gimbal lock of three angles, "
+            "negative principal moments); give the bodies inertia, give the hinges rotor inertia "
+            "(law.inertia), fix those motions, or use ball hinges instead of three angles"
         )
-    raise SceneError(f"scene: {said}")
+    raise SceneError(f"scene: {message}")
 
 
-def _concerned(
+def _undetermined_hinges(
     engine: LoopedEngine, error: UndeterminedMotionError, start: tuple[Array, Array, Array]
 ) -> list[int]:
-    """Places in the tree of all hinges with an undetermined motion, that of the error first."""
+    """Tree indices of all hinges with an undetermined motion, that of the error first."""
     places = [error.place]
-    with rotors(engine.packed.written) as give:
-        while len(places) < _MOST and not engine.is_flexible(places[-1]):
-            give(places[-1])
+    with rotors(engine.packed.written) as add_rotor:
+        while len(places) < _MAX_HINGES and not engine.is_flexible(places[-1]):
+            add_rotor(places[-1])
             try:
                 engine.accelerations(0.0, *start)
-            except UndeterminedMotionError as following:
-                if following.place in places:
+            except UndeterminedMotionError as next_error:
+                if next_error.place in places:
                     break
-                places.append(following.place)
+                places.append(next_error.place)
             except NumericalFailure:
                 break
             else:
@@ -67,12 +67,12 @@ def _concerned(
     return places
 
 
-def _listed(names: list[str]) -> str:
-    """hinges "a", "b" and "c"; of many the first, and how many more."""
-    shown = [f'"{name}"' for name in names[:_NAMED]]
-    rest = len(names) - len(shown)
-    if rest:
-        shown.append(f"{rest} more" if len(names) < _MOST else f"more than {rest - 1} others")
+def _list_hinges(names: list[str]) -> str:
+    """Text such as: hinges "a", "b" and "c"; of many names the first, and the number of others."""
+    shown = [f'"{name}"' for name in names[:_MAX_NAMES]]
+    more = len(names) - len(shown)
+    if more:
+        shown.append(f"{more} more" if len(names) < _MAX_HINGES else f"more than {more - 1} others")
     if len(shown) < 2:
         return f"hinge {''.join(shown)}"
     return f"hinges {', '.join(shown[:-1])} and {shown[-1]}"

@@ -12,10 +12,10 @@ from mstmm.runtime.model.target_error.error_extrapolation import (
     TIGHTEST,
     Kind,
     ToleranceRun,
-    estimate,
+    estimate_error,
     first_rtol,
     next_rtol,
-    no_further_gain,
+    no_gain_reason,
 )
 
 
@@ -34,8 +34,8 @@ def search(error: Callable[[float], float], asked: float, kind: Kind) -> tuple[f
     rtols = [first_rtol(asked, kind)]
     while True:
         found = looks(error, *rtols, kind=kind)
-        known = estimate(found)
-        if known is not None and (known <= asked or no_further_gain(found)):
+        known = estimate_error(found)
+        if known is not None and (known <= asked or no_gain_reason(found)):
             return error(rtols[-1]), known
         rtols.append(next_rtol(found, asked, kind))
 
@@ -56,8 +56,8 @@ def test_errors_that_follow_a_power_are_reached_and_told(
 
 
 def test_one_run_tells_nothing() -> None:
-    assert estimate(looks(lambda rtol: rtol, 1e-3)) is None
-    assert no_further_gain(looks(lambda rtol: rtol, 1e-3)) == ""
+    assert estimate_error(looks(lambda rtol: rtol, 1e-3)) is None
+    assert no_gain_reason(looks(lambda rtol: rtol, 1e-3)) == ""
 
 
 def test_an_error_that_stays_ends_the_search() -> None:
@@ -72,7 +72,7 @@ def test_an_error_that_stays_ends_the_search() -> None:
 def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
     """Errors of the size of the motion however tight, as of chaos."""
     rtols = [first_rtol(1e-6, kind=Kind.EXPLICIT)]
-    while not no_further_gain(found := looks(lambda rtol: 1.0 + 0.3 * math.sin(1 / rtol), *rtols)):
+    while not no_gain_reason(found := looks(lambda rtol: 1.0 + 0.3 * math.sin(1 / rtol), *rtols)):
         rtols.append(next_rtol(found, 1e-6, kind=Kind.EXPLICIT))
     assert rtols[-1] == TIGHTEST
     assert len(rtols) < RUNS
@@ -91,7 +91,7 @@ def test_runs_that_end_elsewhere_have_no_estimate() -> None:
         ToleranceRun(1e-3, Kind.EXPLICIT, math.inf, None),
         ToleranceRun(1e-5, Kind.EXPLICIT, 0.0, None),
     ]
-    assert estimate(found) == math.inf
+    assert estimate_error(found) == math.inf
     assert next_rtol(found, 1e-6, kind=Kind.EXPLICIT) == pytest.approx(1e-6)
 
 
@@ -100,7 +100,7 @@ def test_an_explicit_run_after_an_implicit_one_begins_anew() -> None:
     first = next_rtol(implicit, 1e-7, kind=Kind.EXPLICIT)
     assert first == first_rtol(1e-7, kind=Kind.EXPLICIT)
     found = [*implicit, ToleranceRun(first, Kind.EXPLICIT, 0.0, 1e-2)]
-    assert estimate(found) == pytest.approx(4.0 * 0.05)
+    assert estimate_error(found) == pytest.approx(4.0 * 0.05)
     assert next_rtol(found, 1e-7, kind=Kind.EXPLICIT) == pytest.approx(
         max(first * (0.2 * 1e-5 / 3) ** (1 / 0.9), 3e-6 * first)
     )
@@ -113,7 +113,7 @@ def test_an_explicit_run_after_implicit_ones_that_are_known_is_known_by_them() -
     first = next_rtol(implicit, 1e-3, kind=Kind.EXPLICIT)
     apart = 20.0 * implicit[-1].rtol ** 0.8
     implicit[-1] = ToleranceRun(implicit[-1].rtol, Kind.IMPLICIT, apart, 1e-3)
-    told = estimate([*implicit, ToleranceRun(first, Kind.EXPLICIT, 0.0, 1e-2)])
+    told = estimate_error([*implicit, ToleranceRun(first, Kind.EXPLICIT, 0.0, 1e-2)])
     assert told is not None and told <= 1e-3
     assert first < first_rtol(1e-3, kind=Kind.EXPLICIT)
 
@@ -124,10 +124,10 @@ def test_a_third_run_suffices_where_the_second_errs_twice_as_much_as_was_believe
     def error(rtol: float) -> float:
         return (2.0 if rtol <= rtols[1] else 1.0) * 0.1 * rtol
 
-    known = estimate(looks(error, *rtols))
+    known = estimate_error(looks(error, *rtols))
     assert known is not None
     rtols.append(next_rtol(looks(error, *rtols), known / 3, Kind.EXPLICIT))
-    told = estimate(looks(error, *rtols))
+    told = estimate_error(looks(error, *rtols))
     assert told is not None and told <= known / 3
 
 
@@ -161,9 +161,9 @@ def test_an_estimate_is_the_same_whatever_was_asked_and_covers_the_scatter_of_ru
         ToleranceRun(1e-3, Kind.EXPLICIT, 0.01, None),
         ToleranceRun(1e-6, Kind.EXPLICIT, 0.0, None),
     ]
-    assert estimate(found) == pytest.approx(2 * 2.0 * 0.01 * 10**-2.25)
+    assert estimate_error(found) == pytest.approx(2 * 2.0 * 0.01 * 10**-2.25)
     before = ToleranceRun(1e-1, Kind.EXPLICIT, 0.6, None)
-    assert estimate([before, *found]) == pytest.approx(2.0 * 0.01 * 10**-2.25)
+    assert estimate_error([before, *found]) == pytest.approx(2.0 * 0.01 * 10**-2.25)
 
 
 def test_of_another_method_of_the_kind_less_is_believed() -> None:
@@ -172,9 +172,9 @@ def test_of_another_method_of_the_kind_less_is_believed() -> None:
         ToleranceRun(1e-3, Kind.EXPLICIT, 0.01, None, method="dopri5"),
         ToleranceRun(1e-6, Kind.EXPLICIT, 0.0, None, method="dop853"),
     ]
-    assert estimate(found) == pytest.approx(2 * 2.0 * 0.01 * 10**-1.5)
+    assert estimate_error(found) == pytest.approx(2 * 2.0 * 0.01 * 10**-1.5)
     before = ToleranceRun(1e-1, Kind.EXPLICIT, 0.6, None, method="dopri5")
-    assert estimate([before, *found]) == pytest.approx(2.0 * 0.01 * 10**-1.5)
+    assert estimate_error([before, *found]) == pytest.approx(2.0 * 0.01 * 10**-1.5)
 
 
 @pytest.mark.parametrize(
@@ -184,5 +184,7 @@ def test_of_another_method_of_the_kind_less_is_believed() -> None:
 def test_of_another_kind_less_is_believed(before: Kind, fallen: float) -> None:
     kind = Kind.IMPLICIT if before is Kind.EXPLICIT else Kind.EXPLICIT
     safety = 2.0 * {Kind.IMPLICIT: 1.5, Kind.EXPLICIT: 2.0}[kind]
-    known = estimate([ToleranceRun(1e-3, before, 0.05, 1e-3), ToleranceRun(1e-4, kind, 0.0, 1e-4)])
+    known = estimate_error(
+        [ToleranceRun(1e-3, before, 0.05, 1e-3), ToleranceRun(1e-4, kind, 0.0, 1e-4)]
+    )
     assert known == pytest.approx(safety * 0.05 * fallen)

@@ -171,7 +171,7 @@ def test_threads_do_not_meet() -> None:
 
 
 def alone() -> SingleStateCalls:
-    return model("looped")._alone
+    return model("looped")._single_state
 
 
 def test_it_takes_rows_of_doubles_and_nothing_else() -> None:

@@ -10,7 +10,7 @@ import pytest
 import mstmm
 from mstmm.runtime.integrate.settings import Settings
 from mstmm.runtime.model.target_error.error_extrapolation import Kind
-from mstmm.runtime.model.target_error.initial_vibration import Vibration, vibration
+from mstmm.runtime.model.target_error.initial_vibration import Vibration, initial_vibration
 from mstmm.runtime.model.target_error.method_choice import Family
 
 _ASKED = 1e-6
@@ -29,7 +29,7 @@ def weight(k: float, zeta: float, mass: float = 2.0) -> mstmm.Model:
 
 
 def seen(model: mstmm.Model, span: float, few: float = 0.0) -> Vibration:
-    return vibration(model, 0.0, *model.initial_state(), span, few)
+    return initial_vibration(model, 0.0, *model.initial_state(), span, few)
 
 
 def test_an_undamped_one_lasts_to_the_end() -> None:

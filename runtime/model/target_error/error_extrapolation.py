@@ -169,7 +169,7 @@ def first_rtol(asked: float, kind: Kind, radians: float = 0.0) -> float:
     return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
 
 
-def estimate(looks: Sequence[ToleranceRun]) -> float | None:
+def estimate_error(looks: Sequence[ToleranceRun]) -> float | None:
     """Error of the last of `looks`, which come loose to tight, explicit ones behind others; None
     for one alone."""
     if len(looks) < 2:
@@ -189,7 +189,7 @@ def estimate(looks: Sequence[ToleranceRun]) -> float | None:
 def next_rtol(looks: Sequence[ToleranceRun], asked: float, kind: Kind) -> float:
     """Tolerance of the next run, for an error `asked` in the size of the motion (1 for angles and
     parts); `kind` is that of the method by which it is made."""
-    last, known, tightest, most = looks[-1], estimate(looks), TIGHTEST, _LATER
+    last, known, tightest, most = looks[-1], estimate_error(looks), TIGHTEST, _LATER
     if kind is not last.kind:
         return _changed(last, known, asked, kind)
     if known is None or (looks[-2].kind, looks[-2].method) != (kind, last.method):
@@ -239,7 +239,7 @@ def _changed(last: ToleranceRun, known: float | None, asked: float, kind: Kind) 
     return min(first, max(enough, _FOLLOWING * first, TIGHTEST))
 
 
-def no_further_gain(looks: Sequence[ToleranceRun]) -> str:
+def no_gain_reason(looks: Sequence[ToleranceRun]) -> str:
     """Why a further run would lead nowhere; "" if it may."""
     stays = len(looks) > 3 and not _falls(looks) and not _falls(looks[:-1])
     stays = stays and looks[-2].apart < _USUAL[looks[-1].kind].parted

@@ -109,7 +109,7 @@ class Vibration:
         return float(counted.max(initial=0.0))
 
 
-def vibration(
+def initial_vibration(
     model: CompiledScene, t: float, q: Array, u: Array, span: float, few: float
 ) -> Vibration:
     """That of a run of `span` s from (nq,), (nu,); the rate alone of scenes of many components, and

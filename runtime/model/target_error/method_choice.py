@@ -26,7 +26,7 @@ from ...run import external_integrators
 from ...run.method_switching import implicit_method
 from ...run.spectral_radius import fastest_possible
 from .error_extrapolation import Kind
-from .initial_vibration import Vibration, vibration
+from .initial_vibration import Vibration, initial_vibration
 from .struck_beam import starts_vibrating
 
 if TYPE_CHECKING:
@@ -88,13 +88,13 @@ _FREED = 8.0
 _possible: WeakKeyDictionary[CompiledScene, float] = WeakKeyDictionary()
 
 
-def kind_of_run(run: Trajectory) -> Kind:
+def run_kind(run: Trajectory) -> Kind:
     """The kind of the method that made a run; explicit if all were."""
-    kinds = {kind_of(one.method) for one in run.methods} or {kind_of(run.settings.method)}
+    kinds = {method_kind(one.method) for one in run.methods} or {method_kind(run.settings.method)}
     return kinds.pop() if len(kinds) == 1 else Kind.IMPLICIT
 
 
-def kind_of(method: str) -> Kind:
+def method_kind(method: str) -> Kind:
     """The kind of a method; `auto` begins by an explicit one."""
     if method == _EXPONENTIAL:
         return Kind.EXPONENTIAL
@@ -105,15 +105,15 @@ def kind_of(method: str) -> Kind:
     return Kind.EXPLICIT if explicit else Kind.IMPLICIT
 
 
-def held_back(run: Trajectory) -> bool:
+def is_stability_limited(run: Trajectory) -> bool:
     """Whether stability set a part of the steps of a run that counts."""
     counted = run.statistics
     return counted is not None and counted.stability_limited_steps > _PART * counted.steps
 
 
-def damps(run: Trajectory) -> bool:
+def damps_own_errors(run: Trajectory) -> bool:
     """Whether steps of a run, set by stability, damp their own errors."""
-    return run.settings.method == _LOOSE_EXPLICIT and held_back(run)
+    return run.settings.method == _LOOSE_EXPLICIT and is_stability_limited(run)
 
 
 def _fastest_possible(model: CompiledScene) -> float:
@@ -147,7 +147,7 @@ class Family:
         if not self._free or _fastest_possible(model) * self._span <= _SMOOTH:
             return
         try:
-            self._fast = vibration(model, settings.t_start, q, u, self._span, _SMOOTH)
+            self._fast = initial_vibration(model, settings.t_start, q, u, self._span, _SMOOTH)
             swinging = self._rising(_SWINGING, _RISES_SWINGING) * model.nu
             followed = self._lasts + _FOLLOWING * self.radians
             lasting = self._lasts < _LASTING * self._many
@@ -160,7 +160,7 @@ class Family:
     def begins(self) -> Kind:
         """The kind of the first run."""
         if not self._free or self._rescued:
-            return kind_of(self._settings.method)
+            return method_kind(self._settings.method)
         if self._tried:
             return Kind.EXPONENTIAL
         return Kind.IMPLICIT if self._lasts > self._many else Kind.EXPLICIT
@@ -214,7 +214,7 @@ class Family:
     def next(self, rtol: float, asked: float, made: Sequence[Trajectory]) -> Kind:
         """The kind of the next run after these ones: `rtol` is its tolerance if it is of the same
         kind as the last one, `asked` the wanted error in the size of the motion."""
-        last, kind = made[-1], kind_of_run(made[-1])
+        last, kind = made[-1], run_kind(made[-1])
         if kind is Kind.EXPLICIT or self._settled_on(made):
             return kind
         order = get(implicit_method(rtol)).order if kind is Kind.IMPLICIT else _ORDER
@@ -243,7 +243,7 @@ class Family:
         damping = self._damping
         if not made:
             return _LOOSE_EXPLICIT if damping else AUTO_EXPLICIT
-        least = _LOW_WHERE_HELD if damping and held_back(made[-1]) else _LOW_ORDER
+        least = _LOW_WHERE_HELD if damping and is_stability_limited(made[-1]) else _LOW_ORDER
         return _LOOSE_EXPLICIT if rtol > least else AUTO_EXPLICIT
 
     def _settled_on(self, made: Sequence[Trajectory]) -> bool:
@@ -252,7 +252,7 @@ class Family:
 
     def most_steps(self, method: str) -> int:
         """Steps after which a first run by this method is given up; 0 for no limit."""
-        most, kind = self._settings.max_steps, kind_of(method)
+        most, kind = self._settings.max_steps, method_kind(method)
         if not self._free or method == AUTO or kind is Kind.IMPLICIT:
             return most
         few = int(_SHORT + _LONG * self._lasts)
@@ -269,10 +269,10 @@ class Family:
         given_up = lost.status is Status.TOO_MANY_STEPS and most != self._settings.max_steps
         if not self._free or method == AUTO or lost.status is None:
             return False
-        if self._tried and kind_of(method) is Kind.EXPONENTIAL:
+        if self._tried and method_kind(method) is Kind.EXPONENTIAL:
             self._tried = False
             return True
-        if kind_of(method) is Kind.EXPLICIT and not given_up:
+        if method_kind(method) is Kind.EXPLICIT and not given_up:
             return False
         self._rescued = True
         return True

@@ -32,13 +32,13 @@ from ..run_results import certify_result
 from .error_extrapolation import (
     Kind,
     ToleranceRun,
-    estimate,
+    estimate_error,
     first_rtol,
     next_rtol,
-    no_further_gain,
+    no_gain_reason,
 )
 from .error_request import ErrorRequest
-from .method_choice import Family, damps, held_back, kind_of_run
+from .method_choice import Family, damps_own_errors, is_stability_limited, run_kind
 
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
@@ -139,7 +139,7 @@ class ToleranceSearch:
         if not run.is_comparable:
             self._failed.append(_attempt(run, spent, None, run.message))
             return run
-        self._made.append(_Made(run, self._numbers(run), spent, kind_of_run(run)))
+        self._made.append(_Made(run, self._numbers(run), spent, run_kind(run)))
         self._look()
         return None
 
@@ -167,7 +167,7 @@ class ToleranceSearch:
             self._looks[-1] = self._looks[-1].seen(way)
         counted = last.run.statistics
         summed = None if counted is None else counted.sum_local_error
-        rtol, held = last.run.settings.rtol, held_back(last.run)
+        rtol, held = last.run.settings.rtol, is_stability_limited(last.run)
         radians = self._family.radians if last.kind is Kind.IMPLICIT else 0.0
         calm = last.kind is Kind.EXPLICIT and self._family.calm(last.run)
         growth = self._growth(last)
@@ -185,7 +185,7 @@ class ToleranceSearch:
         if self._model.flexible and isinstance(self._measure, Coordinates):
             self._measure.scale_by(last.numbers)
             shaped = min(_SHAPED / self._measure.least, _MOST_SHAPED)
-            return shaped * (_DAMPED if damps(last.run) else 1.0)
+            return shaped * (_DAMPED if damps_own_errors(last.run) else 1.0)
         left = self._family.leaves(last.run) and not self._model.flexible
         return _OF_SPEEDS if left else None
 
@@ -226,7 +226,7 @@ class ToleranceSearch:
     def _known(self) -> float | None:
         """Estimated error of the last run, in the unit of what is wanted; None where nothing is
         known of it."""
-        found = estimate(self._looks)
+        found = estimate_error(self._looks)
         return None if found is None or found == math.inf else found * self._size
 
     def _settled(self, lost: Trajectory | None) -> str | None:
@@ -237,7 +237,7 @@ class ToleranceSearch:
             return ""
         if lost is not None:
             return f"the next run, rtol {lost.settings.rtol:.0e}, failed: {lost.message}"
-        return no_further_gain(self._looks) or None
+        return no_gain_reason(self._looks) or None
 
     def _first(self) -> tuple[str, float]:
         """Method and tolerance of the first run."""
