@@ -44,9 +44,9 @@ def test_it_is_what_the_library_gives(mstmm: Command, folder: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (("--error", "1e-6", "--rtol", "1e-9"), "rtol = 1e-09 beside error"),
-        (("--error", "1e-6", "--step", "0.01"), "step = 0.01 beside error"),
-        (("--error", "1e-6", "--method", "rk4"), "takes fixed steps"),
+        (("--error", "1e-6", "--rtol", "1e-9"), "rtol = 1e-09 together with error"),
+        (("--error", "1e-6", "--step", "0.01"), "step = 0.01 together with error"),
+        (("--error", "1e-6", "--method", "rk4"), "has fixed steps"),
         (("--error", "1e-6", "--resume"), "no checkpoint"),
         (("--error", "1e-6", "--accuracy", "1e-3"), "leave out --accuracy"),
         (("--error", "1e-6", "--of", "nothing"), "no such quantity"),

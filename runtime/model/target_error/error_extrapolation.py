@@ -1,10 +1,10 @@
-"""What several runs at different tolerances tell of their errors, and of the one to make next.
+"""Error extrapolation over tolerances, and the tolerance of the next run.
 
-The run at the tightest tolerance stands for the truth: how far the others are from it is about
-their error.  Its own error is that of the next looser one, less by a power of the tolerance that
-few runs fall short of, times a number that covers the scatter of single runs.  Of a power that was
-observed no more than this one is believed, and of a run by another method less: its errors may be
-larger at the same tolerance.  One estimate decides on whether another run is made, and is told.
+The run at the tightest tolerance is the reference: the distance of the others to it is about their
+error.  Its own error is that of the next looser run, reduced by a cautious power of the tolerance,
+times a factor for the scatter of single runs.  An observed power is used only up to this one, and a
+smaller power applies between methods, because errors of another method may be larger at the same
+tolerance.  The same estimate decides on a further run and is reported.
 
 Hairer, Norsett, Wanner, Solving ODEs I, II.4 (tolerance and global error).
 """
@@ -20,15 +20,15 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-#: The tightest tolerance that has a meaning.
+#: Tightest meaningful tolerance.
 TIGHTEST = 1e-13
 
-#: From this tolerance down rounding may be what is seen: two runs alone do not show errors falling.
+#: Tolerance below which differences may be rounding, so that two runs show no decrease of errors.
 _ROUNDING = 5e-12
 
 
 class Kind(Enum):
-    """Of a method: what sets its steps, and how its error falls with the tolerance."""
+    """Kind of a method, by its step control and the decrease of its error with the tolerance."""
 
     EXPLICIT = "explicit"
     IMPLICIT = "implicit"
@@ -36,106 +36,111 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True)
-class _Usual:
-    """What is taken for usual of a kind of method.
+class _KindParameters:
+    """Parameters of a kind of method, typical values from experience.
 
     Attributes:
-        first: the first tolerance in what is wanted, and its bounds.
-        reach: the first tolerance is at most so many times what is wanted.
-        growth, held: the error in what local errors sum up to; and where stability sets the steps,
-            for then local errors are those of fast motion, which hardly add up.
-        power: of the tolerance by which errors fall.
-        summed: the same of what local errors sum up to.
-        aim: what a next tolerance aims at by local errors, in what is wanted.
-        safety: the error in what the power makes of the distance.
-        parted: runs that differ by more (in the size of the motion) tell nothing of the power.
-        least: of a next tolerance in the one before.
+        first: first tolerance relative to the target error, and its bounds.
+        max_first: largest first tolerance relative to the target error.
+        growth, limited_growth: error relative to the sum of local errors; and if stability limits
+            the steps, because local errors are then those of fast motion, which hardly add up.
+        power: error is proportional to this power of the tolerance.
+        sum_power: the same for the sum of local errors.
+        target_share: share of the target error at which a next tolerance by local errors aims.
+        safety: factor on the error extrapolated by the power.
+        divergence: distance, relative to the motion, beyond which runs do not show the power.
+        min_factor: smallest ratio of a next tolerance to the one before.
     """
 
     first: tuple[float, float, float]
-    reach: float
+    max_first: float
     growth: float
-    held: float
+    limited_growth: float
     power: float
-    summed: float
-    aim: float
+    sum_power: float
+    target_share: float
     safety: float
-    parted: float
-    least: float
+    divergence: float
+    min_factor: float
 
 
-_USUAL = {
-    Kind.EXPLICIT: _Usual((3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.75, 1.0, 0.2, 2.0, 0.7, 3e-6),
-    Kind.IMPLICIT: _Usual((30.0, 3e-5, 3e-2), 1e6, 1.0, 1.0, 0.6, 0.9, 0.6, 1.5, 0.1, 1e-6),
-    Kind.EXPONENTIAL: _Usual((30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.5, 0.1, 1e-4),
+_PARAMETERS = {
+    Kind.EXPLICIT: _KindParameters(
+        (3.0, 3e-4, 1e-3), 2.5e3, 3.0, 0.3, 0.75, 1.0, 0.2, 2.0, 0.7, 3e-6
+    ),
+    Kind.IMPLICIT: _KindParameters(
+        (30.0, 3e-5, 3e-2), 1e6, 1.0, 1.0, 0.6, 0.9, 0.6, 1.5, 0.1, 1e-6
+    ),
+    Kind.EXPONENTIAL: _KindParameters(
+        (30.0, 1e-4, 1e-2), 1e6, 1.0, 1.0, 0.6, 0.6, 0.4, 1.5, 0.1, 1e-4
+    ),
 }
 
-#: Where local errors are not known, their sum is taken for so many times the tolerance.
-_UNKNOWN = 15.0
+#: Sum of local errors relative to the tolerance where it is not known.
+_SUM_PER_RTOL = 15.0
 
-#: The part of an observed power that is trusted; powers of explicit runs scatter by chance: one
-#: above the second number here counts as the usual one.
-_TRUSTED, _NOISE = 0.9, 0.5
+#: Share of an observed power that is used.  Powers of explicit runs scatter: one above the second
+#: number counts as the typical one.
+_POWER_SHARE, _POWER_NOISE = 0.9, 0.5
 
-#: Two runs alone may be near each other by chance: their distance counts so many times.
-_TWO_ALONE = 2.0
+#: Factor on the distance of only two runs, which may be near each other by chance.
+_TWO_RUN_FACTOR = 2.0
 
-#: Powers between runs by different methods, and where errors hardly fall; steps of the exponential
-#: method tell nothing of others.
-_CHANGED, _HARDLY = 0.5, 0.25
+#: Power between runs by different methods, and for errors that hardly decrease.  Runs of the
+#: exponential method show nothing about others.
+_POWER_BETWEEN_METHODS, _MIN_POWER = 0.5, 0.25
 
-#: A next tolerance aims at this part of what is wanted once runs have been compared, by explicit
-#: steps, and by others.  A run more costs more than tighter steps of high order.
-_AIM, _AIM_OF_OTHERS = 0.5, 0.6
+#: Share of the target error at which a next tolerance aims after a comparison, for explicit and for
+#: other methods.  A further run costs more than tighter steps of high order.
+_TARGET_SHARE, _TARGET_SHARE_OTHERS = 0.5, 0.6
 
-#: A next tolerance is at most this part of the one before: of the first one, and of later ones.
-_MOST, _LATER = 0.3, 0.1
+#: Largest ratio of a next tolerance to the one before: to the first one, and to later ones.
+_MAX_FIRST_STEP, _MAX_LATER_STEP = 0.3, 0.1
 
-#: The first explicit tolerance behind runs of other kinds is at least this part of the usual first
-#: one.
-_FOLLOWING = 1e-4
+#: Smallest ratio of the first explicit tolerance after other kinds to the typical first one.
+_MIN_EXPLICIT_SHARE = 1e-4
 
-#: The next tolerance in the one before, where runs have parted: at most, and at least.
-_LEAP, _FAR_LEAP = 1e-1, 1e-2
+#: Largest and smallest ratio of a next tolerance to the one before, where runs have diverged.
+_MAX_DIVERGED_STEP, _MIN_DIVERGED_STEP = 1e-1, 1e-2
 
-#: The error in what local errors sum up to, a radian of vibration that is followed implicitly: its
-#: phase goes on to err by what they change.
-_WAVING = 0.25
+#: Error relative to the sum of local errors, per radian of vibration that implicit steps resolve:
+#: its phase error persists.
+_GROWTH_PER_RADIAN = 0.25
 
-#: Of runs that part behind this part of the time the growth of errors is known; the estimate in
-#: what it makes of the tolerance.
-_LATE, _DOUBT = 0.8, 10.0
+#: Share of the time after which a divergence of runs shows the growth of errors, and the factor on
+#: the estimate by this growth.
+_LATE_DIVERGENCE, _GROWTH_SAFETY = 0.8, 10.0
 
-#: The first implicit tolerance in what is asked, by radians of vibration that it has to follow.
-_A_RADIAN = 10.0
+#: First implicit tolerance relative to the target error, times the radians of vibration to resolve.
+_RTOL_PER_RADIAN = 10.0
 
-#: The next tolerance in the one before, at least, of calm runs: where that is at most so many times
-#: what is asked, and errors are not taken to fall; and beyond.
-_CALM, _NEAR, _CALM_BEYOND = 0.1, 100.0, 3e-3
+#: Smallest ratio of a next tolerance to the one before for calm runs: if that is at most the second
+#: number times the target error, so that errors may not decrease; and otherwise.
+_MIN_CALM_STEP, _NEAR_TARGET, _MIN_CALM_STEP_FAR = 0.1, 100.0, 3e-3
 
-#: Errors may stay for a while above this tolerance: those of implicit methods as long as vibrations
-#: are not resolved, and those of long explicit steps by chance.
-_SLOW = 1e-7
+#: Tolerance above which errors may be constant for a while: of implicit methods while they do not
+#: resolve vibrations, of long explicit steps by chance.
+_SLOW_DECAY_RTOL = 1e-7
 
-#: Most runs.
+#: Largest number of runs.
 RUNS = 8
 
 
 @dataclass(frozen=True)
 class ToleranceRun:
-    """One run as the search sees it.
+    """One run of a search over tolerances.
 
     Attributes:
         rtol: its relative tolerance.
-        kind: of its method; of several, explicit if all are.
-        method: its name.
-        apart: how far it is from the tightest run; 0 for that one, inf where they end elsewhere.
-        summed: its local errors added up; None where the method keeps none.
-        held: stability, not accuracy, set many of its steps.
-        growth: its error in what local errors sum up to, where more is known of it than is usual.
-        radians: of vibration above what is asked that implicit steps have to follow.
-        calm: explicit steps left vibration behind that is below it.
-        parted: the part of the run after which it had left the tightest one; 1 if it never has.
+        kind: kind of its method; of several methods explicit if all are.
+        method: name of its method.
+        apart: distance to the tightest run; 0 for that one, inf for other end times.
+        summed: sum of its local errors; None if the method computes none.
+        held: whether stability, not accuracy, limited many of its steps.
+        growth: error relative to the sum of local errors, where it is better known than typically.
+        radians: radians of vibration above the target error that implicit steps have to resolve.
+        calm: whether vibration that explicit steps do not resolve is below the target error.
+        parted: share of the run after which it had diverged from the tightest one; 1 if never.
     """
 
     rtol: float
@@ -149,146 +154,166 @@ class ToleranceRun:
     parted: float = 1.0
     method: str = ""
 
-    def seen(self, way: Array) -> ToleranceRun:
-        """With how far it is from the tightest one at each sample, (n,); empty: they end
-        elsewhere."""
-        if not len(way):
+    def seen(self, distances: Array) -> ToleranceRun:
+        """Run with its distances (n,) to the tightest one; empty for another end time."""
+        if not len(distances):
             return replace(self, apart=math.inf)
-        gone = np.flatnonzero(~(way < _USUAL[self.kind].parted))
-        parted = float(gone[0]) / max(len(way) - 1, 1) if len(gone) else 1.0
-        return replace(self, apart=float(way.max()), parted=parted)
+        diverged = np.flatnonzero(~(distances < _PARAMETERS[self.kind].divergence))
+        parted = float(diverged[0]) / max(len(distances) - 1, 1) if len(diverged) else 1.0
+        return replace(self, apart=float(distances.max()), parted=parted)
 
 
-def first_rtol(asked: float, kind: Kind, radians: float = 0.0) -> float:
-    """The first tolerance: loose, for it is there to look.  Implicit runs that have to follow so
-    many radians of vibration tell nothing before they do."""
-    times, tightest, loosest = _USUAL[kind].first
-    wanted = min(max(times * asked, tightest), loosest)
+def first_rtol(target: float, kind: Kind, radians: float = 0.0) -> float:
+    """First tolerance: loose, to explore the motion.
+
+    Tighter for implicit runs, which give no information until they resolve the `radians` of
+    vibration.
+    """
+    factor, tightest, loosest = _PARAMETERS[kind].first
+    rtol = min(max(factor * target, tightest), loosest)
     if kind is Kind.IMPLICIT and radians > 1.0:
-        wanted = min(wanted, _A_RADIAN * asked / radians)
-    return max(min(wanted, _USUAL[kind].reach * asked), TIGHTEST)
+        rtol = min(rtol, _RTOL_PER_RADIAN * target / radians)
+    return max(min(rtol, _PARAMETERS[kind].max_first * target), TIGHTEST)
 
 
-def estimate_error(looks: Sequence[ToleranceRun]) -> float | None:
-    """Error of the last of `looks`, which come loose to tight, explicit ones behind others; None
-    for one alone."""
-    if len(looks) < 2:
+def estimate_error(runs: Sequence[ToleranceRun]) -> float | None:
+    """Estimated error of the last of `runs`; None for a single one.
+
+    Ordered from loose to tight, explicit runs after others.
+    """
+    if len(runs) < 2:
         return None
-    before, last = looks[-2:]
-    fallen = (last.rtol / before.rtol) ** _power(looks) if last.rtol < before.rtol else 1.0
-    usual = _USUAL[last.kind]
-    known = usual.safety * before.apart * (_TWO_ALONE if len(looks) == 2 else 1.0)
-    if before.apart < usual.parted:
-        stays = last.calm and before.calm and last.rtol >= 0.99 * _CALM * before.rtol
-        return known * (1.0 if stays else fallen)
-    if before.kind is last.kind is Kind.EXPLICIT and _LATE <= before.parted < 1.0:
-        return min(known, _DOUBT * last.rtol * _growth(before))
-    return known
+    before, last = runs[-2:]
+    reduction = (last.rtol / before.rtol) ** _error_power(runs) if last.rtol < before.rtol else 1.0
+    parameters = _PARAMETERS[last.kind]
+    error = parameters.safety * before.apart * (_TWO_RUN_FACTOR if len(runs) == 2 else 1.0)
+    if before.apart < parameters.divergence:
+        is_constant = last.calm and before.calm and last.rtol >= 0.99 * _MIN_CALM_STEP * before.rtol
+        return error * (1.0 if is_constant else reduction)
+    if before.kind is last.kind is Kind.EXPLICIT and _LATE_DIVERGENCE <= before.parted < 1.0:
+        return min(error, _GROWTH_SAFETY * last.rtol * _error_growth(before))
+    return error
 
 
-def next_rtol(looks: Sequence[ToleranceRun], asked: float, kind: Kind) -> float:
-    """Tolerance of the next run, for an error `asked` in the size of the motion (1 for angles and
-    parts); `kind` is that of the method by which it is made."""
-    last, known, tightest, most = looks[-1], estimate_error(looks), TIGHTEST, _LATER
+def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
+    """Tolerance of the next run, by a method of the given kind.
+
+    `target` is the target error relative to the size of the motion (1 for angles and ratios).
+    """
+    last, error, tightest, max_factor = runs[-1], estimate_error(runs), TIGHTEST, _MAX_LATER_STEP
     if kind is not last.kind:
-        return _changed(last, known, asked, kind)
-    if known is None or (looks[-2].kind, looks[-2].method) != (kind, last.method):
-        factor, tightest = _foretold(last, asked), min(_ROUNDING, last.rtol / 2)
-        most = _MOST
-    elif not looks[-2].apart < _USUAL[kind].parted:
-        factor = _LEAP
-        if kind is Kind.EXPLICIT and looks[-2].parted < 1.0:
-            factor = min(max(_beyond(looks[-2], asked) / last.rtol, _FAR_LEAP), _LEAP)
+        return _rtol_of_other_kind(last, error, target, kind)
+    if error is None or (runs[-2].kind, runs[-2].method) != (kind, last.method):
+        factor, tightest = _factor_by_local_errors(last, target), min(_ROUNDING, last.rtol / 2)
+        max_factor = _MAX_FIRST_STEP
+    elif not runs[-2].apart < _PARAMETERS[kind].divergence:
+        factor = _MAX_DIVERGED_STEP
+        if kind is Kind.EXPLICIT and runs[-2].parted < 1.0:
+            factor = min(
+                max(_rtol_without_divergence(runs[-2], target) / last.rtol, _MIN_DIVERGED_STEP),
+                _MAX_DIVERGED_STEP,
+            )
     else:
-        aim = _AIM if kind is Kind.EXPLICIT else _AIM_OF_OTHERS
-        factor, most = (aim * asked / known) ** (1 / _USUAL[kind].power), _MOST
-    return max(last.rtol * min(max(factor, _USUAL[kind].least), most), tightest)
+        share = _TARGET_SHARE if kind is Kind.EXPLICIT else _TARGET_SHARE_OTHERS
+        factor, max_factor = (
+            (share * target / error) ** (1 / _PARAMETERS[kind].power),
+            _MAX_FIRST_STEP,
+        )
+    return max(last.rtol * min(max(factor, _PARAMETERS[kind].min_factor), max_factor), tightest)
 
 
-def _foretold(last: ToleranceRun, asked: float) -> float:
-    """The next tolerance in the last one by what its local errors sum up to."""
-    usual = _USUAL[last.kind]
-    factor = float((usual.aim * asked / _summed(last)) ** (1 / usual.summed))
+def _factor_by_local_errors(last: ToleranceRun, target: float) -> float:
+    """Ratio of the next tolerance to the last one, from the sum of its local errors."""
+    parameters = _PARAMETERS[last.kind]
+    factor = float(
+        (parameters.target_share * target / _error_by_local_errors(last))
+        ** (1 / parameters.sum_power)
+    )
     if not last.calm:
         return factor
-    return max(factor, _CALM if last.rtol <= _NEAR * asked else _CALM_BEYOND)
+    return max(factor, _MIN_CALM_STEP if last.rtol <= _NEAR_TARGET * target else _MIN_CALM_STEP_FAR)
 
 
-def _beyond(before: ToleranceRun, asked: float) -> float:
-    """The tolerance at which a run is to stay near, if errors grow on as they have until an earlier
-    one had left."""
-    usual = _USUAL[before.kind]
-    aim = _AIM * asked / (before.rtol * _growth(before))
-    return before.rtol * min(aim, 1.0) ** (1 / usual.power)
+def _rtol_without_divergence(before: ToleranceRun, target: float) -> float:
+    """Tolerance at which a run should not diverge, at the error growth of a diverged run."""
+    parameters = _PARAMETERS[before.kind]
+    share = _TARGET_SHARE * target / (before.rtol * _error_growth(before))
+    return before.rtol * min(share, 1.0) ** (1 / parameters.power)
 
 
-def _growth(look: ToleranceRun) -> float:
-    """How far errors grow to the end, at the pace from the tolerance of a run to where it is said
-    to have left."""
-    left = max(_USUAL[look.kind].parted / look.rtol, 1.0)
-    return float(left ** (1.0 / max(look.parted, 0.1)))
+def _error_growth(run: ToleranceRun) -> float:
+    """Growth of errors over the whole time, at the rate until a run had diverged."""
+    ratio = max(_PARAMETERS[run.kind].divergence / run.rtol, 1.0)
+    return float(ratio ** (1.0 / max(run.parted, 0.1)))
 
 
-def _changed(last: ToleranceRun, known: float | None, asked: float, kind: Kind) -> float:
-    """The first tolerance of another kind: of an explicit one behind others one with which it is
-    known by them, for stability sets its steps in any case."""
-    first = first_rtol(asked, kind)
-    if known is None or kind is not Kind.EXPLICIT:
+def _rtol_of_other_kind(
+    last: ToleranceRun, error: float | None, target: float, kind: Kind
+) -> float:
+    """First tolerance of another kind of method.
+
+    For an explicit method after others it is tight enough for the target, because stability limits
+    its steps anyway.
+    """
+    first = first_rtol(target, kind)
+    if error is None or kind is not Kind.EXPLICIT:
         return first
-    enough = last.rtol * (_AIM * asked / (_USUAL[kind].safety * known)) ** (1 / _CHANGED)
-    return min(first, max(enough, _FOLLOWING * first, TIGHTEST))
+    sufficient = last.rtol * (_TARGET_SHARE * target / (_PARAMETERS[kind].safety * error)) ** (
+        1 / _POWER_BETWEEN_METHODS
+    )
+    return min(first, max(sufficient, _MIN_EXPLICIT_SHARE * first, TIGHTEST))
 
 
-def no_gain_reason(looks: Sequence[ToleranceRun]) -> str:
-    """Why a further run would lead nowhere; "" if it may."""
-    stays = len(looks) > 3 and not _falls(looks) and not _falls(looks[:-1])
-    stays = stays and looks[-2].apart < _USUAL[looks[-1].kind].parted
-    if stays and looks[-1].rtol < _SLOW:
+def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
+    """Reason that no tolerance helps, or ""."""
+    is_constant = len(runs) > 3 and not _error_decreases(runs) and not _error_decreases(runs[:-1])
+    is_constant = is_constant and runs[-2].apart < _PARAMETERS[runs[-1].kind].divergence
+    if is_constant and runs[-1].rtol < _SLOW_DECAY_RTOL:
         return (
-            "the error falls no more with the tolerance (rounding, or jumps of forces at which no "
-            "step ends)"
+            "the error no longer decreases with the tolerance (rounding, or jumps of forces within "
+            "steps)"
         )
-    if looks[-1].rtol < 2 * TIGHTEST:  # runs at nearly the same tolerance tell nothing
-        return f"no tolerance below {TIGHTEST:.0e} has a meaning in these numbers"
-    return f"{RUNS} runs did not get there" if len(looks) >= RUNS else ""
+    if runs[-1].rtol < 2 * TIGHTEST:  # runs at nearly the same tolerance show no difference
+        return f"tolerances below {TIGHTEST:.0e} are below rounding"
+    return f"target not reached in {RUNS} runs" if len(runs) >= RUNS else ""
 
 
-def _summed(look: ToleranceRun) -> float:
-    """What the error of a run is by its local errors, about."""
-    usual = _USUAL[look.kind]
-    known = look.summed or _UNKNOWN * look.rtol
-    usually = usual.held if look.held else usual.growth
-    return known * (look.growth or usually + _WAVING * look.radians)
+def _error_by_local_errors(run: ToleranceRun) -> float:
+    """Estimated error of a run from its local errors."""
+    parameters = _PARAMETERS[run.kind]
+    local_sum = run.summed or _SUM_PER_RTOL * run.rtol
+    growth = parameters.limited_growth if run.held else parameters.growth
+    return local_sum * (run.growth or growth + _GROWTH_PER_RADIAN * run.radians)
 
 
-def _power(looks: Sequence[ToleranceRun]) -> float:
-    """The power by which the error of the last run is believed to have fallen."""
-    before, last = looks[-2:]
-    seen, usual = _seen(looks), _USUAL[last.kind].power
+def _error_power(runs: Sequence[ToleranceRun]) -> float:
+    """Power of the tolerance by which the error of the last run is taken to have decreased."""
+    before, last = runs[-2:]
+    observed, parameters = _observed_power(runs), _PARAMETERS[last.kind].power
     if before.kind is not last.kind or before.method != last.method:
-        usual = 0.0 if before.kind is Kind.EXPONENTIAL else _CHANGED
-    if seen is None:
-        return _HARDLY if last.rtol <= _ROUNDING else usual
-    if last.kind is Kind.EXPLICIT and seen > _NOISE:
-        return usual
-    return min(max(_TRUSTED * seen, _HARDLY), usual)
+        parameters = 0.0 if before.kind is Kind.EXPONENTIAL else _POWER_BETWEEN_METHODS
+    if observed is None:
+        return _MIN_POWER if last.rtol <= _ROUNDING else parameters
+    if last.kind is Kind.EXPLICIT and observed > _POWER_NOISE:
+        return parameters
+    return min(max(_POWER_SHARE * observed, _MIN_POWER), parameters)
 
 
-def _falls(looks: Sequence[ToleranceRun]) -> bool:
-    seen = _seen(looks)
-    return seen is None or seen > _HARDLY
+def _error_decreases(runs: Sequence[ToleranceRun]) -> bool:
+    observed = _observed_power(runs)
+    return observed is None or observed > _MIN_POWER
 
 
-def _seen(looks: Sequence[ToleranceRun]) -> float | None:
-    """The power that the last three runs show; None where they show none."""
-    if len(looks) < 3:
+def _observed_power(runs: Sequence[ToleranceRun]) -> float | None:
+    """Power shown by the last three runs; None if they show none."""
+    if len(runs) < 3:
         return None
-    a, b, last = looks[-3:]
+    a, b, last = runs[-3:]
     if not a.kind is b.kind is last.kind or not a.method == b.method == last.method:
         return None
     if not 0 < b.apart < math.inf or not 0 < a.apart < math.inf:
         return None
-    parted = _USUAL[last.kind].parted
-    if a.apart > parted:
-        return None if b.apart < parted else 0.0
+    divergence = _PARAMETERS[last.kind].divergence
+    if a.apart > divergence:
+        return None if b.apart < divergence else 0.0
     return math.log(a.apart / b.apart) / math.log(a.rtol / b.rtol)

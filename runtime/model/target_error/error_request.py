@@ -1,4 +1,4 @@
-"""What `simulate(error=...)` may be asked for, and together with what."""
+"""Target error of `simulate(error=...)`, and the settings allowed with it."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from mstmm.errors import SceneError
 from ...integrate.steppers import AUTO, get
 from ...run import classical_run, external_integrators
 
-#: Errors below this cannot be told from rounding.
-LEAST = 1e-12
+#: Errors below this cannot be distinguished from rounding.
+MIN_ERROR = 1e-12
 
 
 @dataclass(frozen=True)
 class ErrorRequest:
-    """A wanted error, of named quantities or, with none, of all coordinates."""
+    """Target error, of named quantities or, with none, of all coordinates."""
 
     error: float
     of: tuple[str, ...] = ()
@@ -27,7 +27,7 @@ class ErrorRequest:
 
 @dataclass(frozen=True)
 class Control:
-    """What a user said of method and accuracy; None where nothing was said."""
+    """Method and accuracy as given by the user; None where not given."""
 
     method: str | None
     step: float | None
@@ -35,10 +35,10 @@ class Control:
     atol: float | None
 
     def filled(self) -> tuple[str, float, float]:
-        """Method, relative and absolute tolerance, with the defaults where nothing was said."""
-        usual = AUTO if self.step is None else METHOD
+        """Method, relative and absolute tolerance, with defaults where not given."""
+        default_method = AUTO if self.step is None else METHOD
         return (
-            usual if self.method is None else self.method,
+            default_method if self.method is None else self.method,
             RTOL if self.rtol is None else self.rtol,
             ATOL if self.atol is None else self.atol,
         )
@@ -47,51 +47,54 @@ class Control:
 def parse_error_request(
     error: float | None, of: str | Sequence[str], given: Control, kept: bool
 ) -> ErrorRequest | None:
-    """What was asked for; None for no error.  `kept`: with a checkpoint, or resumed.
+    """Checked request for a target error; None without one.
 
-    Raises SceneError for an error that nobody can reach, and beside what would fix the steps.
+    `kept` means with a checkpoint, or resumed.  Raises SceneError for an error that cannot be
+    reached, and together with settings of the steps.
     """
     names = require_texts("error_of", of, "rod1.angle")
     if error is None:
         if names:
-            raise SceneError(f"error_of = {names[0]!r} says what an error is of; give error too")
+            raise SceneError(
+                f"error_of = {names[0]!r}: expected a target error for it; give error too"
+            )
         return None
     value = finite_float("error", error, "an error above zero, such as 1e-6")
     if not value > 0:
         raise SceneError(f"error = {value:g}: expected an error above zero, such as 1e-6")
     if value >= 1 and len(names) != 1:
         raise SceneError(
-            f"error = {value:g}: expected less than 1: it is in rad, and in parts of how far other "
-            "coordinates go; name one quantity (error_of) for an error in its unit"
+            f"error = {value:g}: expected less than 1, in rad, and relative to the excursion of "
+            "other coordinates; name one quantity (error_of) for an error in its unit"
         )
-    if value < LEAST:
+    if value < MIN_ERROR:
         raise SceneError(
-            f"error = {value:g}: rounding of numbers of 16 digits leaves more; expected {LEAST:g} "
-            "or above"
+            f"error = {value:g}: expected {MIN_ERROR:g} or more, because rounding to 16 digits "
+            "causes larger errors"
         )
-    _alone(given, kept)
+    _check_settings(given, kept)
     return ErrorRequest(value, names)
 
 
-def _alone(given: Control, kept: bool) -> None:
-    """SceneError for what cannot stand beside an error."""
+def _check_settings(given: Control, kept: bool) -> None:
+    """Raise SceneError for settings that are not allowed together with an error."""
     for name in ("rtol", "atol", "step"):
         value = getattr(given, name)
         if value is not None:
             raise SceneError(
-                f"{name} = {value!r} beside error: the error decides on tolerances and steps; "
-                "leave one of the two out"
+                f"{name} = {value!r} together with error: the error determines tolerances and "
+                "steps; give only one of the two"
             )
     if kept:
         raise SceneError(
-            "error takes several runs, of which no checkpoint is kept: leave checkpoint and resume "
-            "out, or run with the method and the tolerances that a run with error has found"
+            "error needs several runs, which have no checkpoint: leave out checkpoint and resume, "
+            "or use the method and the tolerances that a run with error has found"
         )
     method = given.method
     if method is None or method == AUTO or method in external_integrators.METHODS:
         return
     if method in classical_run.METHODS or not get(method).adaptive:
         raise SceneError(
-            f"method {method!r} beside error: it takes fixed steps, which no tolerance bounds; "
-            "leave method out, or name one that chooses its steps"
+            f"method {method!r} together with error: it has fixed steps, without a tolerance; "
+            "leave out method, or give one with adaptive steps"
         )

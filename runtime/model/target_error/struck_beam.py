@@ -1,8 +1,8 @@
-"""Whether a scene is a beam on one hinge that begins to vibrate from its start.
+"""Detection of a beam on one hinge that vibrates from its start.
 
-Its motion is then vibration about one that changes little: an exponential method follows it by few
-steps.  With more hinges the vibrations themselves change with their angles, and a beam that nothing
-shakes does not vibrate at all.
+Its motion is vibration about a slowly varying one, which an exponential method integrates with few
+steps.  With more hinges the vibrations change with their angles; without excitation the beam does
+not vibrate.
 """
 
 from __future__ import annotations
@@ -16,24 +16,24 @@ from mstmm.array_validation import Array
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
 
-#: Most speeds, and most of them that are none of a shape.
-_SPEEDS, _RIGID = 6, 1
+#: Largest number of speeds, and of those that do not belong to shapes.
+_MAX_SPEEDS, _MAX_RIGID_SPEEDS = 6, 1
 
-#: The part of the largest acceleration that counts.
-_PART = 1e-3
+#: Acceleration of a shape, relative to the largest one, that counts as excitation.
+_MIN_SHARE = 1e-3
 
 
 def starts_vibrating(model: CompiledScene, t: float, q: Array, u: Array) -> bool:
-    """Whether it is one, at a start (nq,), (nu,).
+    """Whether a scene is a vibrating beam on one hinge at q (nq,), u (nu,) and t (s).
 
-    Raises NumericalFailure where that cannot be evaluated.
+    Raises NumericalFailure if the start cannot be evaluated.
     """
     engine = model.looped
     shapes = np.zeros(engine.nu, bool)
     for body in model.layout.modal.values():
         shapes[body.u_slice] = True
-    if not shapes.any() or engine.nu > _SPEEDS or np.count_nonzero(~shapes) > _RIGID:
+    if not shapes.any() or engine.nu > _MAX_SPEEDS or np.count_nonzero(~shapes) > _MAX_RIGID_SPEEDS:
         return False
     state = q[None].copy(), u[None].copy(), engine.start_memory()[None]
-    found = np.abs(engine.accelerations(t, *state)[1][0])
-    return bool(u[shapes].any() or found[shapes].max() > _PART * found.max())
+    accelerations = np.abs(engine.accelerations(t, *state)[1][0])
+    return bool(u[shapes].any() or accelerations[shapes].max() > _MIN_SHARE * accelerations.max())
