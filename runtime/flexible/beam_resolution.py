@@ -1,4 +1,4 @@
-"""Highest frequency that the shapes of a beam resolve, under the boundary conditions of the scene.
+"""Highest frequency that the shapes of a beam resolve in its scene.
 
 Per direction, the natural frequencies of the shapes (with the rigid motions of the beam) are
 compared with those of a fine finite-element model: once with all ends free but the inboard one,
@@ -86,7 +86,7 @@ def _fixed_unknowns(
 
 
 def _frequencies(k: Array, m: Array, columns: Array | None, fixed: list[int]) -> Array:
-    """Natural frequencies (rad/s, ascending) with the unknowns `fixed`, in the span of `columns`.
+    """Natural frequencies (rad/s, ascending) with some unknowns fixed, in the span of `columns`.
 
     `columns` None stands for all motions.
     """

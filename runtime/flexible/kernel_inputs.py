@@ -1,4 +1,4 @@
-"""Kernel inputs of flexible bodies and of their sections, and changes of the frame of a body."""
+"""Kernel inputs of flexible bodies and their sections, and changes of frame."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ def _frame_twist(held: ModalPort, eta: Array) -> tuple[Array, Array]:
 
 
 def _twist_transform(rotation: Array, shift: Array) -> Array:
-    """Transform (..., 6, 6) of the twist of an inboard point to that of an outboard one, its axes.
+    """Transform (..., 6, 6) from the twist of an inboard point to that of an outboard one.
 
     `rotation` turns outboard axes to inboard axes; `shift` leads from the inboard to the outboard
     point, inboard axes, m.

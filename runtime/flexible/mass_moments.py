@@ -1,4 +1,4 @@
-"""Integrals over the undeformed mass of a flexible body, which its inertia forces are made of."""
+"""Mass integrals of an undeformed flexible body, which determine its inertia forces."""
 
 from __future__ import annotations
 

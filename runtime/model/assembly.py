@@ -25,9 +25,9 @@ class Assembly(AssessedAnswer, tuple[Array, Array]):
 
     def __new__(cls, model: CompiledScene, t: float, q: Array, u: Array) -> Self:
         """The state q (nq,), u (nu,) of a model at t (s)."""
-        made = super().__new__(cls, (q, u))
-        made.findings = DeferredRisks(lambda: find_state_risks(model, t, q, u))
-        return made
+        assembly = super().__new__(cls, (q, u))
+        assembly.findings = DeferredRisks(lambda: find_state_risks(model, t, q, u))
+        return assembly
 
     def __reduce__(self) -> tuple[type[tuple[Array, Array]], tuple[tuple[Array, Array]]]:
         return tuple, ((self[0], self[1]),)

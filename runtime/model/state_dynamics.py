@@ -236,5 +236,5 @@ class DynamicsQueries(KinematicQueries):
         """
         names = require_texts("parameters", parameters, "rod1.mass")
         differentiation = self._differentiations.get(names) or self._differentiation(names)
-        found = differentiation(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
-        return found if out is None else found.kept_in(out)
+        answer = differentiation(q, u, t, efforts, lambda: self.accelerations(q, u, t, efforts))
+        return answer if out is None else answer.kept_in(out)

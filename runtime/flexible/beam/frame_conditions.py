@@ -31,7 +31,7 @@ WORST_CONDITION = 1e11
 def modes_in_frame(
     data: BeamData, direction: str, shapes: list[Shape], frame: Frame
 ) -> tuple[list[Mode], list[str]]:
-    """Modes of one direction, from shapes without their rigid parts, and notes on dropped shapes.
+    """Modes of one direction: shapes without rigid parts; and notes on dropped shapes.
 
     Raises SceneError for shapes that are linearly dependent or all rigid.
     """

@@ -40,10 +40,10 @@ def shape_density(shapes: Sequence[Shape]) -> Density:
 
 
 def gauss_between(places: Iterable[float], density: Density) -> tuple[Array, Array]:
-    """Gauss points and weights (m) for products of two shapes, between neighbouring `places` (m).
+    """Gauss points and weights (m) for products of two shapes, between given positions (m).
 
-    `density` gives the half-waves per metre.  Long pieces are divided, because rules of high order
-    lose digits.
+    `places` are ascending; `density` gives the half-waves per metre between two of them.  Long
+    pieces are divided, because rules of high order lose digits.
     """
     points, point_weights = [], []
     for a, b in pairwise(places):

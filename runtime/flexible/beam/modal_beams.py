@@ -1,4 +1,4 @@
-"""Beams of a scene as `ModalBody`: sections, frame, shapes, integrals, damping, start values."""
+"""Beams of a scene as `ModalBody`: frame, shapes, integrals, damping, initial values."""
 
 from __future__ import annotations
 

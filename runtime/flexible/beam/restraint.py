@@ -94,8 +94,8 @@ def biconnected_components(edges: list[Edge]) -> list[list[Edge]]:
                 continue
             visited.add(number)
             open_edges.append(number)
-            one, other = edges[number].ends
-            end = other if one == body else one
+            first_end, second_end = edges[number].ends
+            end = second_end if first_end == body else first_end
             if end in order:
                 low[body] = min(low[body], order[end])
             else:

@@ -1,4 +1,4 @@
-"""Second-order displacement and rotation along a beam, -1/2 eta^T g eta, in its floating frame.
+"""Second-order displacement and rotation -1/2 eta^T g eta along a beam, in its frame.
 
 The rates along the beam are generated kernels (`derive.flexible.beam_foreshortening`).  They are
 integrated here, less the rigid motion that the conditions of the floating frame remove: in second

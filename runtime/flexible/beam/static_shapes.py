@@ -34,7 +34,7 @@ def direction_stiffness(data: BeamData, direction: str) -> Array:
 def bending_static_shapes(
     data: BeamData, direction: str, base: float, others: Sequence[float]
 ) -> list[Piecewise]:
-    """Static bending shapes: unit deflection, then unit rotation times length, of each interface.
+    """Static bending shapes: unit deflection and unit rotation times length of each interface.
 
     All other interfaces (x in m) are clamped, as is `base`.
     """

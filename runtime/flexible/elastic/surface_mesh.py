@@ -42,7 +42,7 @@ def _cell_numbers(points: Array, cell: float) -> Integers:
 
 
 def boundary_triangles(mesh: Any, scalar: Any) -> Integers:
-    """Triangles (m, 3) of nodes on the boundary of a scikit-fem mesh, anticlockwise from outside.
+    """Triangles (m, 3) of nodes on the surface of a scikit-fem mesh, anticlockwise outside.
 
     Facets are divided at the midside nodes of their edges.
     """
