@@ -1,1 +1,1 @@
-"""Elements and their derivations as pages for a reader."""
+"""Pages that display elements and their derivations."""

@@ -1,7 +1,7 @@
 """Typeset plain formulas inside sentences of derivations (`S_Q = S - U G`).
 
-What counts as a formula: names of a letter or a Greek letter, with their dots, subscripts and
-superscripts, and the signs between them.  Everything else stays text.
+A formula consists of names (a Latin or Greek letter with dots, subscripts and superscripts) and the
+signs between them.  Everything else stays text.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _TOKEN_PATTERN = re.compile(
     r"|(?P<sign>[-+]?=|[-+/*<])"
     r"|(?P<other>[\w']+|.)"
 )
-#: Words that look like a letter with dots, and the articles that look like names.
+#: Words that look like a letter with dots, and articles that look like names.
 _WORDS, _ARTICLES = {"add", "odd", "id", "ad"}, {"a", "A"}
 #: Longest subscript of a name; longer ones are words joined by underscores.
 _MAX_SUBSCRIPT_LENGTH = 4
@@ -31,7 +31,7 @@ _NO_NEIGHBOUR = ("", "")
 
 
 def split_caption(text: str) -> Iterator[str | Node]:
-    """Text and formulas, in order."""
+    """Text and formulas of a sentence, in order."""
     tokens = _resolve_tokens([_classify_token(match) for match in _TOKEN_PATTERN.finditer(text)])
     formula: list[Node] = []
     blank = ""
@@ -87,7 +87,7 @@ def _with_exponent(base: Node, exponent: str) -> Node:
 
 
 def _resolve_tokens(tokens: list[Token]) -> Iterator[Token]:
-    """Signs and articles are parts of a formula where their neighbours are."""
+    """Classify signs and articles as formula parts if their neighbours are."""
     solid = [token for token in tokens if token[0] != "blank"]
     solid_index = 0
     for kind, text, node in tokens:
@@ -120,7 +120,7 @@ def _resolve_tokens(tokens: list[Token]) -> Iterator[Token]:
 
 
 def _makes_name(neighbour: tuple[str, str]) -> bool:
-    """Whether an article next to this token is a name."""
+    """Whether an article next to this token is a symbol."""
     kind, text = neighbour
     return kind in ("name", "raised") or (kind == "sign" and text != "-")
 

@@ -14,18 +14,17 @@ from .subjects import element_view
 CLASSICAL_COUNTERPARTS = {"hinge_ball": "classical_ball", "hinge_pin": "classical_pin_spatial"}
 
 _EXPLANATION = (
-    "Both say what a hinge does to accelerations and loads. The classical matrix takes the whole "
-    "state z_I of the inboard side to the state z_O behind the hinge; the relative acceleration, "
-    "which it cannot know, it finds from the block of the body outboard, so that the matrix "
-    "belongs to the two together. The motion subspace H says the same of the hinge alone: the "
-    "relative acceleration is H udot, and the load f has no share on it but the effort, "
-    "H^T f = tau. The sweep then asks the body outboard through f = S a + e, and divides by "
-    "D = H^T S H, which has a row for each free speed and no more."
+    "Both forms relate accelerations and loads on the two sides of a hinge. The classical matrix "
+    "maps the state z_I of the inboard side to the state z_O of the outboard side. The relative "
+    "acceleration follows from a block of the outboard body, so the matrix depends on hinge and "
+    "body. The motion subspace H depends on the hinge only: the relative acceleration is H udot, "
+    "and the load f satisfies H^T f = tau with the effort tau. The sweep then uses f = S a + e of "
+    "the outboard body and factors D = H^T S H, which has one row for each free speed."
 )
 
 
 def classical_comparison(name: str) -> tuple[str, Callable[[TextWidth], list[Item]]]:
-    """Title and items of a hinge ("hinge_pin") in both forms.
+    """Title and items of a page that compares both forms of a hinge ("hinge_pin").
 
     Raises ElementError for a hinge without a classical matrix.
     """

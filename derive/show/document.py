@@ -20,7 +20,7 @@ from .symbol_names import parse_author_name, parse_name
 
 STAGES = ("equations", "matrix", "ir", "c")
 
-#: Meaning of the blocks of a transfer matrix, by the unit of a state's first block.
+#: Blocks of a transfer matrix, by the unit of the first block of the state.
 STATES = {
     "[m/s2": "blocks: acceleration, angular acceleration, moment, force, 1",
     "[m": "blocks: position, angle, moment, force, modal coordinates where there are any, 1",
@@ -29,10 +29,10 @@ STATES = {
 
 @dataclass(frozen=True)
 class ElementView:
-    """One element to show; kernels and C are only made for a stage that needs them.
+    """One element to show; kernels and C are made only for stages that need them.
 
-    `sources` are those of the element; of an element (`is_element`, not a step of the sweep) all
-    other sources of derivations and kernels are those of the sweep.
+    `sources` belong to the element.  If `is_element` (an element, not a step of the sweep), all
+    other sources of derivations and kernels count as sources of the sweep.
     """
 
     name: str
@@ -47,7 +47,7 @@ class ElementView:
 
 @dataclass(frozen=True)
 class Heading:
-    """Title of a page (level 1), of a derivation (2) or of a part of it (3)."""
+    """Title of a page (level 1), of a derivation (2) or of a section (3)."""
 
     text: str
     level: int
@@ -63,7 +63,7 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class QuantityRow:
-    """One line of a table of quantities; `inner` ones are entries of the one above."""
+    """One line of a table of quantities; `inner` rows are entries of the row above."""
 
     symbol: Node
     port: str
@@ -101,7 +101,7 @@ Item = Heading | Paragraph | Quantities | Formula | Code
 
 
 def document(view: ElementView, at: str, measure: TextWidth) -> list[Item]:
-    """Items of the page at a stage, of formulas that fit.  ElementError for an unknown stage."""
+    """Items of the page at a stage, with formulas that fit.  Raises ElementError."""
     builders: dict[str, Callable[[ElementView], list[Item]]] = {
         "equations": lambda v: _derivation_items(v, _equation_items, measure),
         "matrix": lambda v: _derivation_items(v, _matrix_items, measure),
@@ -109,7 +109,7 @@ def document(view: ElementView, at: str, measure: TextWidth) -> list[Item]:
         "c": _c_source_items,
     }
     if at not in builders:
-        raise ElementError(f"no stage {at!r}; there are {', '.join(STAGES)}")
+        raise ElementError(f"unknown stage {at!r}; expected one of {', '.join(STAGES)}")
     return [
         Heading(view.title, 1),
         *_source_items(view, _collect_sources(view)),
@@ -123,7 +123,7 @@ def _collect_sources(view: ElementView) -> tuple[str, ...]:
 
 
 def _source_items(view: ElementView, sources: tuple[str, ...]) -> list[Item]:
-    """Sources of the element, and apart from them those of the sweep."""
+    """Sources of the element, then separately those of the sweep."""
     return [
         Paragraph(source, "sweep" if view.is_element and source not in view.sources else "sources")
         for source in sources
@@ -154,7 +154,7 @@ def _equation_items(derivation: Derivation, written: FormulaWriter) -> list[Item
 
 
 def _matrix_items(derivation: Derivation, written: FormulaWriter) -> list[Item]:
-    """The definitions that follow from the premises, large matrices block by block."""
+    """Definitions that follow from the premises, large matrices block by block."""
     items: list[Item] = [Heading("Result", 3), _quantity_table(derivation.outputs, written)]
     states = {q.name: STATES.get(q.unit.split(",")[0], "") for q in derivation.outputs}
     items += [
@@ -195,7 +195,7 @@ def _quantity_row(name: str, shape: tuple[int | str, ...], unit: str, meaning: s
 
 
 def _entry_rows(array: str, parts: Parts) -> Iterator[QuantityRow]:
-    """Rows of the entries of an array, by the author's names."""
+    """Rows of the entries of an array, with the declared names."""
     start = 0
     for part in parts:
         symbol = Name(parse_author_name(part.name) if part.length == 1 else parse_name(part.name))
@@ -209,7 +209,7 @@ def _kernel_items(view: ElementView) -> list[Item]:
     items: list[Item] = []
     for kernel in view.kernels():
         counts = ", ".join(f"{count} {name}" for name, count in kernel.operation_counts().items())
-        once = "; what stands inside loops is counted once" if kernel.size_symbol else ""
+        once = "; operations inside loops are counted once" if kernel.size_symbol else ""
         items += [
             Heading(f"kernel {kernel.name}", 2),
             Paragraph(kernel.purpose or kernel.name),
@@ -242,14 +242,14 @@ def _all_ports(kernel: KernelIR) -> tuple[Port, ...]:
 
 
 class FormulaWriter:
-    """Equations of a derivation as formulas that fit, in the names of its author."""
+    """Formulas of a derivation that fit the page, with the declared names."""
 
     def __init__(self, derivation: Derivation, names: DeclaredNames, measure: TextWidth) -> None:
         self.names, self.measure = names, measure
         self.named = NamedEntries(derivation, names)
 
     def formula(self, e: Equation, labels: str = "") -> Formula:
-        """Formula of an equation, with the meaning of its blocks."""
+        """Formula of an equation, with the description of its blocks."""
         zeros = ""
         if e.zeros:
             zeros = "entries " + ", ".join(f"({i + 1},{j + 1})" for i, j in e.zeros) + " vanish"

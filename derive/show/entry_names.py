@@ -1,4 +1,4 @@
-"""Entries of arrays by the names that their authors gave them: p[0] of a spring is `stiffness`."""
+"""Declared names of array entries: p[0] of a spring is `stiffness`."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..definition.element import describe_array
 
 
 class AuthorName(sp.Symbol):
-    """A number by the name that its author gave it, which says nothing of dots."""
+    """A symbol with the declared name of an entry, in which dots are not parsed."""
 
 
 class Symmetric(sp.MatrixSymbol):
-    """A matrix of which the upper triangle stands for both."""
+    """A symmetric matrix, displayed by its upper triangle."""
 
     def _entry(self, i: sp.Expr, j: sp.Expr, **kwargs: object) -> sp.Expr:
         return MatrixElement(self, min(i, j), max(i, j))
@@ -28,7 +28,7 @@ class Symmetric(sp.MatrixSymbol):
 
 @dataclass(frozen=True)
 class NamedPart:
-    """Neighbouring entries of an array that have a name of their own."""
+    """Consecutive entries of an array that have a common name."""
 
     name: str
     unit: str = ""
@@ -40,13 +40,13 @@ class NamedPart:
         return self.shape[0] * self.shape[1]
 
     def symbols(self) -> list[sp.Basic]:
-        """What stands for each entry, row by row."""
+        """Symbol of each entry, row by row."""
         if self.length == 1:
             return [AuthorName(self.name)]
         return list(sp.MatrixSymbol(self.name, *self.shape).as_explicit())
 
     def written(self) -> list[str]:
-        """What code calls each entry; counted from zero as code does."""
+        """Name of each entry in code, indices from zero."""
         rows, columns = self.shape
         if self.length == 1:
             return [self.name]
@@ -69,7 +69,7 @@ def _motion_parts(subscript: str) -> Parts:
     )
 
 
-#: How small an inertia is that is taken for rounding.
+#: Inertias below which a value counts as rounding.
 _FLOOR_PARTS = (
     NamedPart("floor_v", "kg", "least mass along an axis"),
     NamedPart("floor_w", "kg*m2", "least inertia about an axis"),
@@ -77,34 +77,34 @@ _FLOOR_PARTS = (
 
 
 def _sweep_array_parts(array: str) -> Parts:
-    """Arrays that the sweep hands from body to body."""
+    """Names of arrays that the sweep passes from body to body."""
     head, _, subscript = array.partition("_")
     if head == "motion":
         return _motion_parts(f"_{subscript}" if subscript else "")
     return _FLOOR_PARTS if array == "floor" else ()
 
 
-#: Behind the parameters of a body that is stated in a frame of its own.
+#: Follow the parameters of a body that is defined in its own frame.
 _FRAME_PARTS = (
     NamedPart("R_u", "", "rotation, hinge axes to the body's own", (3, 3)),
     NamedPart("r_u", "m", "P from the body's own origin, own axes", (3, 1)),
 )
-#: Arrays that go with coordinates, and with speeds, entry by entry.
+#: Arrays whose entries correspond to coordinates, and to speeds.
 _WITH_COORDINATES, _WITH_SPEEDS = ("qdot",), ("s", "udot", "tau", "g", "z")
 
 
 @dataclass(frozen=True)
 class DeclaredNames:
-    """What the author of an element declared, by the arrays that hold it."""
+    """Names declared by an element, by array."""
 
     own: Mapping[str, Parts] = field(default_factory=dict)
-    #: Labels of the entries of arrays that go along with coordinates or speeds.
+    #: Labels of entries of arrays that correspond to coordinates or speeds.
     along: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    #: How the meaning of an array lists them, which a table of entries need not say again.
+    #: Lists of entries in descriptions of arrays; omitted where a table shows the entries.
     listed: tuple[str, ...] = ()
 
     def parts(self, array: str, length: int) -> Parts:
-        """Names of the entries of an array of this length; none where nobody named them."""
+        """Names of the entries of an array of this length; empty if none are declared."""
         array_parts = self.own.get(array, ())
         for parts in (
             array_parts,
@@ -116,18 +116,18 @@ class DeclaredNames:
         return ()
 
     def written(self, array: str, length: int) -> tuple[str, ...]:
-        """Entries of an array as code is read: p.stiffness, w[0]; none where nobody named them."""
+        """Entries of an array as in code (p.stiffness, w[0]); empty if none are declared."""
         base, slope = array.removeprefix("d_"), "d_" if array.startswith("d_") else ""
         prefix = f"{slope}{base}." if base in self.own else slope
         return tuple(prefix + x for part in self.parts(base, length) for x in part.written())
 
     def labels(self, array: str, length: int) -> tuple[str, ...]:
-        """Indices of the entries on a left side, where there are several."""
+        """Indices of the entries on a left side with several entries."""
         array_labels = self.along.get(array, ())
         return array_labels if len(array_labels) == length > 1 else ()
 
     def meaning(self, text: str) -> str:
-        """The meaning of an array without the list of its entries."""
+        """Description of an array without the list of its entries."""
         for entry_list in self.listed:
             text = text.replace(entry_list, "", 1)
         return text
@@ -136,7 +136,7 @@ class DeclaredNames:
 def declared_names(
     coordinates: Iterable[Param], speeds: Iterable[Param], parameters: Iterable[Param]
 ) -> DeclaredNames:
-    """Names of the arrays p, q and u and of those that go along with them."""
+    """Names of the arrays p, q and u and of the arrays that correspond to them."""
     groups = {"p": tuple(parameters), "q": tuple(coordinates), "u": tuple(speeds)}
     parts_by_array = {
         array: tuple(NamedPart(x.name, x.unit, x.meaning) for x in group)
@@ -152,12 +152,12 @@ def declared_names(
 
 
 def spec_names(spec: ElementSpec) -> DeclaredNames:
-    """The same of an element that is stored."""
+    """Declared names of a stored element."""
     return declared_names(spec.coordinates, spec.speeds, spec.parameters)
 
 
 class NamedEntries:
-    """What a derivation's arrays hold, by names of which none is that of another quantity."""
+    """Unambiguous names of the entries of a derivation's arrays."""
 
     def __init__(self, derivation: Derivation, names: DeclaredNames) -> None:
         self.names = names
@@ -172,7 +172,7 @@ class NamedEntries:
             if _has_fixed_length(s)
         }
         self._parts = {name: self._apart(name, int(s.rows)) for name, s in arrays.items()}
-        #: Entry of an array -> what its author calls it.
+        #: Entry of an array -> declared name.
         self.entries = _symmetric_entries(derivation)
         for name, symbol in arrays.items():
             values = [symbol_ for part in self._parts[name] for symbol_ in part.symbols()]
@@ -180,11 +180,11 @@ class NamedEntries:
             self.entries |= _labelled_entries(name, symbol, names)
 
     def parts(self, array: str, length: int) -> Parts:
-        """The entries of an array of this length."""
+        """Entries of an array of this length."""
         return self._parts[array] if array in self._parts else self.names.parts(array, length)
 
     def _apart(self, array: str, length: int) -> Parts:
-        """Where a name is taken, the array stands before it: p_name."""
+        """Parts with the array as a prefix (p_name) where the name is taken."""
         parts = []
         for part in self.names.parts(array, length):
             name = part.name if part.name not in self._taken else f"{array}_{part.name}"
@@ -194,13 +194,13 @@ class NamedEntries:
 
 
 def _has_fixed_length(symbol: sp.MatrixSymbol) -> bool:
-    """Whether this is a column of a length that is known."""
+    """Whether a symbol is a column of fixed length."""
     rows, columns = symbol.shape
     return bool(columns == 1 and rows.is_Integer and rows > 0)
 
 
 def _symmetric_entries(derivation: Derivation) -> dict[sp.Basic, sp.Basic]:
-    """Symmetric matrices, and their entries, as such."""
+    """Replacements of symmetric matrices and their entries by `Symmetric` ones."""
     replacements: dict[sp.Basic, sp.Basic] = {}
     for q in derivation.inputs:
         if q.symmetric and not q.sized:

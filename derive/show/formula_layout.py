@@ -1,4 +1,4 @@
-"""Expressions as a small layout tree, which text, LaTeX and MathML print alike.
+"""Layout tree of expressions, shared by text, LaTeX and MathML.
 
 SymPy's own printers differ in what they can show (dotted derivatives, cross-product matrices,
 solves) and its MathML does not escape "<"; here the expression is laid out once, by the printer
@@ -42,7 +42,7 @@ class Word:
 
 @dataclass(frozen=True)
 class Sign:
-    """An operator; `spaced` puts room around it."""
+    """An operator; `spaced` adds space around it."""
 
     text: str
     spaced: bool = False
@@ -50,14 +50,14 @@ class Sign:
 
 @dataclass(frozen=True)
 class Row:
-    """Nodes side by side."""
+    """Nodes in a row."""
 
     items: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
 class Fraction:
-    """above / below."""
+    """Fraction above / below."""
 
     above: Node
     below: Node
@@ -65,7 +65,7 @@ class Fraction:
 
 @dataclass(frozen=True)
 class Raised:
-    """base with a superscript."""
+    """Base with a superscript."""
 
     base: Node
     exponent: Node
@@ -73,7 +73,7 @@ class Raised:
 
 @dataclass(frozen=True)
 class Fence:
-    """body between delimiters."""
+    """Body between delimiters."""
 
     left: str
     body: Node
@@ -89,7 +89,7 @@ class Root:
 
 @dataclass(frozen=True)
 class Table:
-    """A matrix; `cases` prints the open-ended brace of a choice instead of brackets."""
+    """A matrix; with `cases` a left brace replaces the brackets."""
 
     rows: tuple[tuple[Node, ...], ...]
     cases: bool = False
@@ -97,7 +97,7 @@ class Table:
 
 Node = Name | Word | Sign | Row | Fraction | Raised | Fence | Root | Table
 
-#: Arrays of coordinates, speeds, parameters, efforts, and numbers per mode: entries are counted.
+#: Arrays of coordinates, speeds, parameters, efforts and modal quantities: entries are numbered.
 COORDINATE_ARRAYS = frozenset(
     (
         *("q", "qdot", "u", "udot", "p", "g", "s", "tau", "tau_n", "alpha", "effort"),
@@ -120,17 +120,17 @@ def layout(expression: sp.Basic, names: Mapping[sp.Basic, Node] | None = None) -
 
 
 def equation(left: Node, right: Node) -> Row:
-    """left = right."""
+    """Layout of left = right."""
     return Row((left, Sign("=", True), right))
 
 
 def _sort_terms(terms: Sequence[sp.Basic]) -> list[sp.Basic]:
-    """Positive terms first; among matrices those with the most time derivatives before others."""
+    """Terms sorted: positive first; matrices by decreasing number of time derivatives."""
     return sorted(terms, key=lambda term: (_is_negative(term), -_max_dots(term)))
 
 
 def _max_dots(term: sp.Basic) -> int:
-    """Most dots on a name in a matrix term; scalars keep their own order."""
+    """Largest number of dots in a matrix term; scalars keep their order."""
     if not getattr(term, "is_Matrix", False):
         return 0
     return max((parse_name(s.name).dots for s in term.atoms(sp.MatrixSymbol)), default=0)
@@ -145,7 +145,7 @@ def _is_negative(term: sp.Basic) -> bool:
 
 
 class _Layout:
-    """Dispatch by class, along the method resolution order as SymPy's printers do."""
+    """Layout by expression class, dispatched along the method resolution order."""
 
     def __init__(self, names: Mapping[sp.Basic, Node]) -> None:
         self.names = names
@@ -269,7 +269,7 @@ class _Layout:
         return Name(parse_name(e.symbol.name), "", ",".join(spans)), _ATOM
 
     def slice_of(self, e: MatrixSlice) -> tuple[Node, int]:
-        """Rows or columns of a matrix; an axis that is whole is not written unless the other is."""
+        """Rows or columns of a matrix; complete axes are written only next to partial ones."""
         spans = []
         for bounds, extent in zip((e.rowslice, e.colslice), e.parent.shape, strict=True):
             start, stop, _ = bounds
@@ -335,13 +335,13 @@ def _span_text(first: sp.Basic, last: sp.Basic) -> str:
 
 
 def element_index(parent: sp.MatrixSymbol, i: int, j: int) -> str:
-    """Index of an entry as shown: x y z of a plane or space vector, else counted from one."""
+    """Displayed index of an entry: x y z for a plane or space vector, else from one."""
     shape = int(parent.rows), int(parent.cols)
     return "" if shape == (1, 1) else entry_index(parent.name, shape, i, j)
 
 
 def entry_index(name: str, shape: tuple[int, int], i: int, j: int) -> str:
-    """Index of the entry i, j (from zero) of an array of this name and shape."""
+    """Displayed index of entry i, j (from zero) of an array of this name and shape."""
     rows, columns = shape
     if columns == 1:
         spatial = rows in (2, 3) and name not in COORDINATE_ARRAYS

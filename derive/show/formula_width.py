@@ -1,4 +1,4 @@
-"""Limits of formula widths: columns in text, points on paper."""
+"""Width limits of formulas: columns in text, points on paper."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from .formula_layout import Node
 from .line_breaking import PAGE_WIDTH, node_width
 from .plain_text import text_box
 
-#: A block wider than this in text gets a name and is spelled out below the matrix.
+#: A block wider than this in text is named and defined below the matrix.
 CELL_WIDTH = 20
-#: A formula wider than this in text is stated entry by entry.
+#: A formula wider than this in text is written entry by entry.
 FORMULA_WIDTH = 96
-#: Explicit matrices wider than this inside a formula that does not fit get a name.
+#: Explicit matrices wider than this inside a formula that does not fit are named.
 INNER_WIDTH = 16
 
 
@@ -18,11 +18,11 @@ class TextWidth:
     """Width limits of text pages, in columns."""
 
     def line(self, node: Node) -> bool:
-        """Whether a formula fits in a line."""
+        """Whether a formula fits on one line."""
         return text_box(node).width <= FORMULA_WIDTH
 
     def cell(self, node: Node, columns: int) -> bool:
-        """Whether a block fits in a matrix of so many columns."""
+        """Whether a block fits in a matrix with this number of columns."""
         return len(text_box(node).lines) == 1 and text_box(node).width <= CELL_WIDTH
 
     def inner(self, node: Node) -> bool:

@@ -1,4 +1,4 @@
-"""One equation as displayed lines: whole, block by block, or entry by entry where too wide."""
+"""Lines of one equation: whole, by blocks, or entry by entry if too wide."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .plain_text import text_box
 from .symbol_names import parse_name
 from .vector_recognition import recognise_matrix
 
-#: Blocks of the matrices of the method: state vectors, wrenches and accelerations.
+#: Block sizes of the matrices of the method: state vectors, wrenches and accelerations.
 PARTITIONS: dict[int, tuple[int, ...]] = {
     13: (3, 3, 3, 3, 1), 7: (2, 1, 1, 2, 1), 12: (3, 3, 3, 3), 9: (3, 3, 3), 6: (3, 3),
     10: (2, 1, 1, 2, 3, 1), 15: (3, 3, 3, 3, 2, 1),
 }  # fmt: skip
-#: Matrices with more operations than this are stated with named common sub-expressions.
+#: Matrices with more operations than this use named common sub-expressions.
 MAX_UNSHARED_OPERATIONS = 150
 
 
@@ -27,18 +27,18 @@ def equation_lines(
     left: sp.Basic,
     right: sp.Basic,
     rows: tuple[str, ...] = (),
-    measure: TextWidth = TextWidth(),  # noqa: B008 - it holds nothing
+    measure: TextWidth = TextWidth(),  # noqa: B008 - stateless
 ) -> list[Node]:
-    """Lines of left = right; matrices in blocks where their extents are those of state vectors.
+    """Lines of left = right; matrices in blocks if their sizes are those of state vectors.
 
-    `rows` are names of the entries of a column, which is stated entry by entry then; `measure`
-    says what fits.
+    `rows` are names of the entries of a column, which is then written entry by entry; `measure`
+    decides what fits.
     """
     return _EquationWriter(measure).equation(layout(left), right, rows)
 
 
 class _EquationWriter:
-    """Formulas by what fits."""
+    """Formulas split according to their width."""
 
     def __init__(self, measure: TextWidth) -> None:
         self.measure = measure
@@ -59,7 +59,7 @@ class _EquationWriter:
         return lines
 
     def rooted(self, matrix: sp.MatrixBase) -> tuple[list[Node], sp.MatrixBase]:
-        """Long roots that stand in many places by a name, each stated once."""
+        """Names of long roots that occur repeatedly, and the matrix that uses them."""
         counts = Counter(
             sp.sqrt(node.base)
             for entry in matrix
@@ -97,7 +97,7 @@ class _EquationWriter:
         return self.spelled(shown, matrix) if is_small else self.blocks(shown, matrix)
 
     def spelled(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-        """A matrix in one formula, or entry by entry where that is too wide."""
+        """A matrix in one formula, or entry by entry if that is too wide."""
         if matrix.shape == (1, 1):
             return self.scalar(shown, matrix[0, 0])
         if recognise_matrix(matrix) is not None or sp.count_ops(matrix) <= MAX_UNSHARED_OPERATIONS:
@@ -107,7 +107,7 @@ class _EquationWriter:
         return self.entries(shown, matrix)
 
     def blocks(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-        """The matrix of its blocks, then the blocks that needed a name."""
+        """The matrix of blocks, then the blocks that were named."""
         rows = PARTITIONS.get(matrix.rows, (matrix.rows,))
         columns = PARTITIONS.get(matrix.cols, (matrix.cols,))
         table: list[tuple[Node, ...]] = []
@@ -127,7 +127,7 @@ class _EquationWriter:
         return [equation(shown, Table(tuple(table))), *block_definitions]
 
     def of_blocks(self, shown: Node, matrix: sp.BlockMatrix) -> list[Node]:
-        """A matrix stated by its blocks, those that do not fit by names."""
+        """A matrix by its blocks; blocks that do not fit are named."""
         rows, columns = matrix.blocks.shape
         block_definitions: list[Node] = []
         table = []
@@ -145,7 +145,7 @@ class _EquationWriter:
         return [equation(shown, Table(tuple(table))), *block_definitions]
 
     def entries(self, shown: Node, matrix: sp.MatrixBase) -> list[Node]:
-        """One line for every entry that does not vanish."""
+        """One line for every non-zero entry."""
         lines: list[Node] = []
         reduced = sp.Matrix(matrix)
         if sp.count_ops(matrix) > MAX_UNSHARED_OPERATIONS:
@@ -162,7 +162,7 @@ class _EquationWriter:
         return lines
 
     def scalar(self, place: Node, value: sp.Basic) -> list[Node]:
-        """place = value; a choice that does not fit becomes one line for each branch."""
+        """place = value; a Piecewise that does not fit has one line per branch."""
         line = equation(place, layout(value))
         if self.measure.line(line) or (
             len(text_box(line).lines) == 1 and not value.has(sp.Piecewise)
@@ -178,7 +178,7 @@ class _EquationWriter:
         return lines
 
     def hoisted(self, shown: Node, right: sp.Basic) -> list[Node]:
-        """Explicit matrices inside a wide expression get names and are stated below it."""
+        """A wide expression whose explicit matrices are named and defined below it."""
         names: dict[sp.Basic, Node] = {}
         for matrix in _inner_matrices(right):
             if matrix not in names and recognise_matrix(matrix) is None:
@@ -195,7 +195,7 @@ class _EquationWriter:
 
 
 def _state_blocks(column: sp.MatrixBase) -> Iterator[sp.MatrixBase]:
-    """Parts of a column as state vectors have them."""
+    """Blocks of a column, with the sizes of state vectors."""
     start = 0
     for height in PARTITIONS[column.rows]:
         yield column[start : start + height, :]
@@ -203,7 +203,7 @@ def _state_blocks(column: sp.MatrixBase) -> Iterator[sp.MatrixBase]:
 
 
 def _indexed_name(shown: Node, index: str) -> Name:
-    """A name made from the left side's by an index."""
+    """Name of the left side with an additional index."""
     if not isinstance(shown, Name):
         return Name(parse_name("B"), "", index)
     outer = shown.index
@@ -226,7 +226,7 @@ def _branch_row(place: Node, value: sp.Basic, condition: sp.Basic) -> Node:
 
 
 def _outermost_choices(value: sp.Basic) -> Iterator[sp.Piecewise]:
-    """Outermost choices of an expression, each once, in a fixed order."""
+    """Outermost Piecewise expressions, without repetition, in a fixed order."""
     visited: set[sp.Basic] = set()
     stack = [value]
     while stack:

@@ -1,4 +1,4 @@
-"""Listing of a KernelIR, one statement each; indices count from zero as the arrays do."""
+"""Listing of a KernelIR, one statement per line; indices from zero as in the arrays."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from .entry_names import DeclaredNames
 
 
 def kernel_listing(kernel: KernelIR, names: DeclaredNames | None = None) -> list[str]:
-    """Every statement, in order; entries of arrays by their names where there are any."""
+    """All statements in order; entries of arrays by their declared names."""
     writer = _ListingWriter(kernel, names or DeclaredNames())
     return [line for statement in kernel.statements for line in writer.lines(statement)]
 
 
 class _ListingWriter:
-    """Statements of a kernel, entries of its arrays by the names of their author."""
+    """Statements of a kernel, with the declared names of array entries."""
 
     def __init__(self, kernel: KernelIR, names: DeclaredNames) -> None:
         ports = (*kernel.inputs, *kernel.outputs)
@@ -48,7 +48,7 @@ class _ListingWriter:
             return [*self.body(statement, indent), f"{target} = {value}{loop_text}"]
         if isinstance(statement, Guard):
             condition = self.operand(statement.condition)
-            return [f"leave with code {statement.code} unless {condition}: {statement.message}"]
+            return [f"return code {statement.code} unless {condition}: {statement.message}"]
         return [
             f"{statement.port} = solve({statement.matrix}, {statement.right})  "
             f"else code {statement.code}: {statement.message}"

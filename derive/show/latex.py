@@ -22,7 +22,7 @@ _TEXT_ESCAPES = {
     "≤": r"$\le$", "≥": r"$\ge$", "²": r"$^2$", "³": r"$^3$", "−": r"$-$",
     "×": r"$\times$", "\u2003": r"\quad{}",
 }  # fmt: skip
-#: Matrices of more columns than this stand closer.
+#: Matrices with more columns than this use narrower spacing.
 _MAX_WIDE_COLUMNS = 5
 
 
@@ -40,7 +40,7 @@ def latex_unit(unit: str) -> str:
 
 
 def latex_name(name: SymbolName, accent: str = "", index: str = "") -> str:
-    """A name with its dots, accent, subscript and index."""
+    """LaTeX of a name with its dots, accent, subscript and index."""
     core = _base_text(name)
     core = {0: core, 1: rf"\dot{{{core}}}", 2: rf"\ddot{{{core}}}"}[min(name.dots, 2)]
     if accent == "tilde":
@@ -66,7 +66,7 @@ def _subscript_text(text: str) -> str:
 
 
 def latex_text(node: Node) -> str:
-    """The node as the content of a formula."""
+    """LaTeX of a node, for use inside a formula."""
     if isinstance(node, Name):
         return latex_name(node.name, node.accent, node.index)
     if isinstance(node, Word):

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from .formula_layout import Fence, Fraction, Name, Node, Raised, Root, Row, Sign, Word
 
-#: Width of a line of text in points where letters are 10 points high (LaTeX's article).
+#: Text width in points at a font size of 10 points (LaTeX's article).
 PAGE_WIDTH = 338.0
-#: Widths in the same points, rounded up: letters, their subscripts, and the space around them.
+#: Widths in points, rounded up: letters, subscripts, and the space around them.
 _LETTER, _SMALL, _SPACED, _THIN, _BRACKET, _GAP = 6.2, 4.2, 13.5, 1.7, 4.5, 10.0
-#: Lines after the first begin this much further right.
+#: Additional indentation of continuation lines.
 HANGING_INDENT = 20.0
 
 
@@ -49,7 +49,8 @@ class PaperLine:
 def paper_lines(lines: Sequence[Node]) -> Iterator[PaperLine]:
     """Break equations, and words between them, into lines that fit the page.
 
-    All lines begin after the widest left side."""
+    All lines start after the widest left side.
+    """
     sides = [_split_sides(line) for line in lines]
     room = PAGE_WIDTH - max((node_width(left) + _SPACED for left, _ in sides if left), default=0.0)
     for left, right in sides:
@@ -69,9 +70,9 @@ def _split_sides(line: Node) -> tuple[Node | None, Node]:
 
 
 def break_lines(node: Node, room: float) -> list[Node]:
-    """Break a node before signs into lines that fit the available width where possible.
+    """Break a node before signs into lines that fit the available width if possible.
 
-    Parentheses that a line leaves open come as signs of their own.
+    Parentheses that a line leaves open are separate signs.
     """
     if node_width(node) <= room or not isinstance(node, Row):
         return [node]
@@ -116,7 +117,7 @@ def _split_at_signs(node: Row, room: float) -> Iterator[list[Node]]:
 
 
 def _flatten_atoms(node: Node, room: float) -> Iterator[Node]:
-    """Nodes of a row, with nodes that are too wide for a line split up."""
+    """Nodes of a row; nodes that are too wide for a line are split."""
     if isinstance(node, Row):
         for item in node.items:
             yield from _flatten_atoms(item, room)

@@ -1,4 +1,4 @@
-"""Layout trees as presentation MathML, and the page around them: one file, no script."""
+"""Layout trees as presentation MathML, and the HTML page: one file, no script."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ pre { background: var(--block); border-radius: 6px; padding: .9rem 1rem; overflo
   .wide, figure .formula { overflow: visible; } }
 """
 
-#: Pages of formulas alone go dark with their reader; pictures of reports are drawn on white.
+#: Pages with formulas only support dark mode; plots of reports need a white background.
 DARK_STYLE = """
 @media (prefers-color-scheme: dark) { :root { color-scheme: dark; --ink: #e3e6ea; --soft: #9aa4af;
   --line: #363c44; --page: #15181c; --block: #1e2227; --accent: #6fb5e0; } }
@@ -68,13 +68,13 @@ DARK_STYLE = """
 
 
 def mathml(node: Node, display: bool = True) -> str:
-    """A <math> element; formulas that stand alone in the size of such."""
+    """A <math> element; `display` for displayed formulas."""
     kind = ' displaystyle="true"' if display else ""
     return f'<math xmlns="http://www.w3.org/1998/Math/MathML"{kind}>{_node_markup(node)}</math>'
 
 
 def name_markup(name: SymbolName, accent: str = "", index: str = "") -> str:
-    """A name with its dots, accent, subscript and index."""
+    """Markup of a name with its dots, accent, subscript and index."""
     base = GREEK.get(name.base, name.base)
     core = f"<mi{_variant_attribute(name, base)}>{escape(base)}</mi>"
     for mark in _accent_marks(name.dots, accent):
@@ -127,7 +127,7 @@ def _node_markup(node: Node) -> str:
 
 
 def _escape_blanks(text: str) -> str:
-    """Escaped, with outer blanks that MathML would drop kept."""
+    """Escaped text that keeps outer blanks, which MathML would drop."""
     return escape(text).replace(" ", "&#160;")
 
 
@@ -148,7 +148,7 @@ def _table_markup(table: Table) -> str:
 
 
 def html_page(title: str, body: str) -> str:
-    """A complete page."""
+    """A complete HTML page."""
     return (
         "<!DOCTYPE html>\n"
         '<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'

@@ -19,7 +19,7 @@ _DIGITS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 @dataclass(frozen=True)
 class Box:
-    """Lines of equal width and the line that carries the baseline."""
+    """Lines of equal width and the index of the baseline."""
 
     lines: tuple[str, ...]
     baseline: int = 0
@@ -30,17 +30,17 @@ class Box:
 
 
 def column_count(text: str) -> int:
-    """Columns a terminal needs: combining marks need none."""
+    """Number of terminal columns; combining marks count as zero."""
     return sum(1 for c in text if not unicodedata.combining(c))
 
 
 def pad_columns(text: str, width: int) -> str:
-    """Text filled with blanks to a width in columns."""
+    """Text padded with blanks to a width in columns."""
     return text + " " * (width - column_count(text))
 
 
 def text_name(name: SymbolName, accent: str = "") -> str:
-    """A name in one line: r̈_IO, ω̇_I, r̃_IC, mass matrix."""
+    """A name on one line: r̈_IO, ω̇_I, r̃_IC, mass matrix."""
     base = GREEK.get(name.base, name.base)
     marks = _DOTS[min(name.dots, 2)]
     core = f"({base})" if accent and len(base) > 1 else base
@@ -52,7 +52,7 @@ def text_name(name: SymbolName, accent: str = "") -> str:
 
 
 def text_box(node: Node) -> Box:
-    """The node as a box; matrices and choices need several lines."""
+    """Box of a node; matrices and cases need several lines."""
     if isinstance(node, Name):
         return Box((text_name(node.name, node.accent) + _index_text(node.index),))
     if isinstance(node, Word):
@@ -79,7 +79,7 @@ def text_box(node: Node) -> Box:
 
 
 def _index_text(index: str) -> str:
-    """.x, [2,3], or the name of a block as it is."""
+    """Text of an index: .x, [2,3], or the name of a block."""
     block, closing, rest_index = index.rpartition("⟩")
     if closing:
         return block + closing + _index_text(rest_index)
@@ -93,12 +93,12 @@ def _compact_sign(text: str) -> str:
 
 
 def _group_quotient_part(node: Node) -> Box:
-    """Parts of a quotient in one line: sums and products in parentheses."""
+    """Box of a numerator or denominator; sums and products in parentheses."""
     return text_box(node if _is_simple(node) else Fence("(", node, ")"))
 
 
 def _is_simple(node: Node) -> bool:
-    if isinstance(node, Row) and len(node.items) == 2:  # a function of something
+    if isinstance(node, Row) and len(node.items) == 2:  # function call
         return isinstance(node.items[0], Word) and isinstance(node.items[1], Fence)
     return isinstance(node, (Name, Word, Fence, Raised, Root))
 
@@ -135,7 +135,7 @@ def _join_boxes(boxes: list[Box]) -> Box:
 
 
 def _table_lines(table: Table) -> list[str]:
-    """Cells in columns, two blanks apart; a tall cell makes its row tall."""
+    """Cells in columns separated by two blanks; a row is as high as its highest cell."""
     cells = [[text_box(node) for node in row] for row in table.rows]
     widths = [max(row[j].width for row in cells) for j in range(len(cells[0]))]
     lines: list[str] = []
@@ -190,7 +190,7 @@ def wrap_formula(node: Node, indent: int = 4, width: int = WIDTH) -> list[str]:
 
 
 def _breakable_texts(node: Node) -> list[str]:
-    """Pieces of a one-line node that may be parted: text that begins a new piece is a sign."""
+    """Pieces of a one-line node between which a line may break, before a sign."""
     if isinstance(node, Row):
         return _join_groups([_breakable_texts(item) for item in node.items])
     if isinstance(node, Fence):
@@ -210,7 +210,7 @@ def _breakable_texts(node: Node) -> list[str]:
 
 
 def _join_groups(groups: list[list[str]]) -> list[str]:
-    """Groups joined end to start: only breaks inside a group stay breaks."""
+    """Joined groups; only breaks inside a group remain breaks."""
     pieces = [""]
     for group in groups:
         pieces[-1] += group[0]

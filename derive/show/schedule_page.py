@@ -1,4 +1,4 @@
-"""The schedule of the sweep for a reader: sweeps, passes, slots and traits."""
+"""Page of the sweep's schedule: sweeps, passes, slots and traits."""
 
 from __future__ import annotations
 
@@ -39,14 +39,13 @@ from .plain_text import WIDTH
 from .show_page import FORMATS, render_page
 from .sweep_walkthrough import walkthrough_items
 
-#: What the page explains before it lists anything.
+#: Introduction of the page.
 _EXPLANATION = (
-    "A sweep runs passes one after the other; a pass meets every body (law, load, ...) in turn and "
-    "calls kernels over named slots: port=slot for what a kernel reads, and behind the arrow for "
-    "what it gives (+= where it adds).  Of a slot x the derivative along a direction is the slot "
-    "d:x.  Conditions and slots are explained in the end.  The loops "
-    "of the looped engine are printed from this list, the fused engine replays it.  The kernels "
-    "are elements: mstmm show sweep_frames, mstmm show pin."
+    "A sweep is a sequence of passes. A pass visits every body (law, load, ...) in turn and calls "
+    "kernels with named slots: port=slot for inputs, and after the arrow for outputs (+= if "
+    "added).  The derivative of a slot x along a direction is the slot d:x.  Conditions and slots "
+    "are listed at the end.  The looped engine's loops are generated from this list; the fused "
+    "engine interprets it.  The kernels are elements: mstmm show sweep_frames, mstmm show pin."
 )
 
 
@@ -57,8 +56,8 @@ def sweep_page(at: str, format: str, specs: Callable[[], Specs]) -> str:
     """
     if at not in ("equations", "c"):
         raise ElementError(
-            f"the sweep has no stage {at!r}; there are equations and c; its steps are elements of "
-            "their own: mstmm show sweep_generic2"
+            f"sweep: unknown stage {at!r}; expected equations or c; its steps are separate "
+            "elements: mstmm show sweep_generic2"
         )
     if at == "c":
         text = "\n".join(sweep_files(specs()).values())
@@ -104,9 +103,7 @@ def _spaced_name(name: str) -> str:
 
 def _run_line(run: Run) -> str:
     name = (
-        f"pass {_spaced_name(run.whole.name)}"
-        if run.whole
-        else f"by hand: {_spaced_name(run.hook)}"
+        f"pass {_spaced_name(run.whole.name)}" if run.whole else f"hook: {_spaced_name(run.hook)}"
     )
     return f"  {name:34}{_condition_prefix(run.when)}".rstrip()
 
@@ -132,13 +129,13 @@ def _condition_prefix(when: str) -> str:
 
 
 class _StepWriter:
-    """Steps as lines."""
+    """Lines of text for steps."""
 
     def __init__(self, specs: Specs) -> None:
         self.specs = specs
 
     def lines(self, steps: Iterable[Step], depth: int) -> list[str]:
-        """Steps under the same condition stand together behind it."""
+        """Lines of steps, grouped by condition."""
         lines = []
         for traits, group in groupby(steps, key=lambda step: step.when):
             lines += [f"{'  ' * depth}{_condition_prefix(traits)}:"] if traits else []
@@ -151,14 +148,14 @@ class _StepWriter:
         if isinstance(step, ByScrew):
             kinds = {
                 "a screw about x": step.about_x, "a screw about z": step.about_z,
-                "a rotation of which nothing is known": step.turning, "else": step.otherwise,
+                "a general rotation": step.turning, "else": step.otherwise,
             }  # fmt: skip
-            lines = [f"{indent}by what is known of {step.rotation} and {step.position}:"]
+            lines = [f"{indent}depending on the structure of {step.rotation} and {step.position}:"]
             for case_name, steps in kinds.items():
                 lines += [f"{indent}  {case_name}:", *self.lines(steps, depth + 2)]
             return lines
         if isinstance(step, EachSpeed):
-            speed_text = "every imposed speed k" if step.imposed else "every speed k"
+            speed_text = "every prescribed speed k" if step.imposed else "every speed k"
             return [f"{indent}for {speed_text}:", *self.lines(step.steps, depth + 1)]
         if isinstance(step, ForEachDirection):
             return [
@@ -189,7 +186,7 @@ class _StepWriter:
 
     @staticmethod
     def _like(element: str, name: str) -> tuple[tuple[str, str], str]:
-        """An element whose kernel has the ports of the one that is called, and its name."""
+        """Element and kernel with the same ports as the called kernel."""
         if element.startswith("generic{"):
             return ("sweep", f"generic{MAX_SPEEDS}"), name
         if element in POINTER_CALLEES:
@@ -198,31 +195,31 @@ class _StepWriter:
         return NAMED_CALLEES.get(element, ("sweep", element)), name
 
 
-#: Directions, each with its number c.
+#: Texts of directions, numbered c.
 _DIRECTION_TEXTS = {
-    "free": "every free speed c of the hinge, and what changes with it in a step",
-    "felt": "every free speed c of the hinge that the law feels",
+    "free": "every free speed c of the hinge, with its dependent changes in a step",
+    "felt": "every free speed c of the hinge that affects the law",
     "rates": "every speed c of the hinge alone",
     "coordinates": "every coordinate c of the hinge alone",
-    "law": "every unknown c that goes with a speed of the law",
-    "modes": "every mode c, and what changes with it in a step",
+    "law": "every unknown c of a speed of the law",
+    "modes": "every mode c, with its dependent changes in a step",
     "motion": "every entry c of the body's motion",
     "spin": "every entry c of the body's angular velocity",
-    "place": "every entry c of a change of the body's place",
-    "turn": "every entry c of a turn of the body",
+    "place": "every entry c of a displacement of the body",
+    "turn": "every entry c of a rotation of the body",
 }
 
-#: Rows met one by one.
+#: Texts of loops over constraint rows.
 _ROW_LOOPS = {
     "closings": "every row that closes on the body",
-    "own": "every coupling of its own speeds",
-    "openings": "every row that closes on the body, the other way round",
+    "own": "every coupling of the hinge's speeds",
+    "openings": "every row that closes on the body, in reverse order",
     "pending": "every row that is open across the hinge",
     "before": "every open row up to this one",
-    "bent": "every row that ends of the flexible body bring",
+    "bent": "every row at ends of the flexible body",
     "bent_before": "every such row up to this one",
     "rows": "every row of the hinge, in direction c",
-    "others": "every row that is coupled with it",
+    "others": "every row coupled with it",
     "seconds": "every such row up to this one",
 }
 
@@ -250,7 +247,7 @@ _STEP_TEXTS: dict[type, Callable[..., str]] = {
     Gather: lambda s: f"{s.to} = expression values at {s.places}",
     Evaluate: lambda s: f"{s.to} = expression {s.expression}",
     ChooseBias: lambda s: (
-        f"{s.motion} stopped along free unit columns of {s.subspace} by {s.chosen}"
+        f"{s.motion} cancelled along free unit columns of {s.subspace} by {s.chosen}"
     ),
     CheckPivots: lambda s: (
         f"{s.pivots} must exceed the rounding of {s.own}, or of {s.whole}  (fails: {s.fails})"
@@ -258,7 +255,7 @@ _STEP_TEXTS: dict[type, Callable[..., str]] = {
 }  # fmt: skip
 
 
-def _definition_rows(head: str, width: int, said: str) -> str:
-    lines = textwrap.wrap(said, WIDTH - width - 3)
+def _definition_rows(head: str, width: int, meaning: str) -> str:
+    lines = textwrap.wrap(meaning, WIDTH - width - 3)
     continuation = [" " * (width + 3) + line for line in lines[1:]]
     return "\n".join([f"  {head:{width}} {lines[0]}", *continuation])

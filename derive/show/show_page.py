@@ -1,4 +1,4 @@
-"""`mstmm show`: stop the line at any stage and print it, as text, LaTeX or one HTML page.
+"""Pages of `mstmm show`: an element at any stage as text, LaTeX or HTML.
 
 Stages: equations (quantities, premises), matrix (what follows from them, block by block), ir (the
 kernels' statements), c (the generated source).  Every page carries units and sources.
@@ -34,14 +34,14 @@ from .mathml import html_page, mathml
 from .plain_text import WIDTH, column_count, pad_columns, text_box, wrap_formula
 from .symbol_names import unit_text
 
-#: Labels of paragraphs that name sources, by their kind.
+#: Labels of source paragraphs, by their kind.
 _SOURCE_LABELS = {"sources": "Source: ", "sweep": "Source of the sweep: "}
 
 __all__ = ["FORMATS", "STAGES", "ElementView", "show", "show_view"]
 
 
 def show(element: str, at: str, format: str, registry: Callable[[str], ElementView]) -> str:
-    """The page of an element.
+    """Page of an element.
 
     `registry` gives the view of a name (and raises ElementError for an unknown one).  Raises
     ElementError for an unknown stage or format.
@@ -50,14 +50,14 @@ def show(element: str, at: str, format: str, registry: Callable[[str], ElementVi
 
 
 def show_view(view: ElementView, at: str = "equations", format: str = "text") -> str:
-    """The page of a view: complete HTML, a LaTeX fragment (amsmath), or text of 100 columns."""
+    """Page of a view: complete HTML, a LaTeX fragment (amsmath), or text of 100 columns."""
     return render_page(view.title, lambda measure: document(view, at, measure), format)
 
 
 def render_page(title: str, items: Callable[[TextWidth], list[Item]], format: str) -> str:
-    """What `items` makes of formulas that fit, as `show_view` prints it."""
+    """Page of `items` in a format, as printed by `show_view`."""
     if format not in FORMATS:
-        raise ElementError(f"no format {format!r}; there are {', '.join(FORMATS)}")
+        raise ElementError(f"unknown format {format!r}; expected one of {', '.join(FORMATS)}")
     return FORMATS[format](title, items(TextWidth() if format == "text" else PaperWidth()))
 
 
@@ -160,12 +160,12 @@ def _latex_item(item: Item) -> str:
     return _VERBATIM.format("\n".join(map(_code_line, item.text.split("\n"))))
 
 
-#: Lines of trees in letters that every font has.
+#: Replacements of box-drawing characters by characters that every font has.
 _ASCII_LINES = str.maketrans({"└": "+", "├": "+", "│": "|", "─": "-", "→": "->"})
 
 
 def _code_line(line: str) -> str:
-    """A line of code, broken where it is wider than the page."""
+    """A line of code, broken if it is wider than the page."""
     line = line.translate(_ASCII_LINES)
     if len(line) <= WIDTH:
         return line
@@ -173,9 +173,9 @@ def _code_line(line: str) -> str:
     return textwrap.fill(line, WIDTH, **options)  # type: ignore[arg-type]
 
 
-#: Rows of a table that fit on a page with room to spare.
+#: Number of table rows that fit on a page.
 _ROWS_PER_TABLE = 24
-#: A line of 100 columns fits the text width.
+#: A line of 100 columns must fit the text width.
 _VERBATIM = "{{\\fontsize{{6}}{{7.2}}\\selectfont\n\\begin{{verbatim}}\n{}\n\\end{{verbatim}}}}"
 _COLUMN_FORMAT = "".join(rf"p{{{w}\textwidth}}" for w in (0.22, 0.19, 0.07, 0.13, 0.31))
 
@@ -210,7 +210,7 @@ def _latex_row(row: QuantityRow) -> str:
 
 
 def _symbol_cell(symbol: Node) -> str:
-    """A name in a table, where long words may part."""
+    """A name in a table, where long words may be broken."""
     if isinstance(symbol, Name) and symbol.name.upright and not symbol.index:
         return _breakable_name(symbol.name.written())
     return f"${latex_text(symbol)}$"

@@ -1,7 +1,7 @@
-"""Subjects of `mstmm show`: every element and every step of the sweep, by name.
+"""Subjects of `mstmm show`: all elements and steps of the sweep, by name.
 
 A full name is kind and name, as in the C files: hinge_pin, body_rigid, force_spring, sweep_frames,
-classical_ball.  The name alone means the first of these kinds that has it.
+classical_ball.  A name without kind means the first of these kinds that has it.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ __all__ = [
 
 ELEMENT_KINDS = ("hinge", "body", "force", "classical", "sweep")
 
-#: A second name of an element: the same motion, its law is in sweep_laws.
+#: Alias of an element: same motion, its law is in sweep_laws.
 _ALIASES = {"hinge_elastic": ("hinge", "free")}
 
 
 def full_names() -> list[str]:
-    """Every full name, by kind."""
+    """All full names, by kind."""
     return list(_element_keys())
 
 
@@ -54,16 +54,16 @@ def _element_keys() -> dict[str, tuple[str, str]]:
     return {f"{kind}_{name}": (kind, name) for kind, name in keys} | _ALIASES
 
 
-def full_name(name: str, known: Iterable[str]) -> str | None:
-    """The full name that a user means, None if there is none."""
-    known_names = set(known)
+def full_name(name: str, available: Iterable[str]) -> str | None:
+    """Full name for a name given by the user; None if there is none."""
+    known_names = set(available)
     return next(
         (c for c in (name, *(f"{kind}_{name}" for kind in ELEMENT_KINDS)) if c in known_names), None
     )
 
 
 def element_view(name: str) -> ElementView:
-    """The view of a built-in element.  Raises ElementError, with the nearest name, for another."""
+    """View of a built-in element.  Raises ElementError with a suggestion if unknown."""
     matched_name = full_name(name, _element_keys())
     if matched_name is None:
         short = [key.split("_", 1)[1] for key in _element_keys()]
@@ -71,7 +71,7 @@ def element_view(name: str) -> ElementView:
         hint = (
             f'; did you mean "{similar_names[0]}"?'
             if similar_names
-            else "; mstmm list shows what there is"
+            else '; "mstmm list" shows the elements'
         )
         raise ElementError(f'element "{name:.60}": there is no such element{hint}')
     kind, element_name = _element_keys()[matched_name]
@@ -82,7 +82,7 @@ def element_view(name: str) -> ElementView:
 
 
 def view_of_element(element: Element) -> ElementView:
-    """View of a hinge, body or force element, built in or a user's."""
+    """View of a hinge, body or force element, built-in or user-defined."""
     name = f"{kind_of(element)}_{element.name}"
     preceding = tuple(
         make() for kind, make in _PRECEDING_DERIVATIONS.items() if type(element) is kind
@@ -98,7 +98,7 @@ def view_of_element(element: Element) -> ElementView:
     return replace(base_view, is_element=True)
 
 
-#: Separate derivations that precede the equations of an element.
+#: Derivations shown before the equations of an element.
 _PRECEDING_DERIVATIONS: dict[type, Callable[[], Derivation]] = {RigidBody: newton_euler_form}
 
 
@@ -109,7 +109,7 @@ def _names_of_element(element: Element) -> DeclaredNames:
 
 
 def _view_of_step(kind: str, name: str) -> ElementView:
-    """A classical matrix or a step of the sweep."""
+    """View of a classical matrix or a step of the sweep."""
     spec = cache(partial(_spec_of_step, kind, name))
     kernels = built_in_kernels(kind, name)
     title = kernels[0].derivation.title if kind == "classical" else _STEP_TITLES.get(name, name)

@@ -1,7 +1,7 @@
-"""The sweep explained by its equations, for a hinge of two speeds.
+"""Explanation of the sweep by its equations, for a hinge of two speeds.
 
-Chapters: motion, absorbing, hinge, port, recovery.  The equations are those of the kernels
-that the schedule calls.
+Chapters: motion, absorption, hinge, port, recovery.  The equations are those of the kernels that
+the schedule calls.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from .document import FormulaWriter, Heading, Item, Paragraph
 from .entry_names import DeclaredNames
 from .formula_width import TextWidth
 
-#: The element whose kernels are shown, and the last equation on the hinge before the port.
+#: Element whose kernels are shown, and the last equation on the hinge before the port.
 _ELEMENT, _ON_THE_HINGE = "generic2", "e_Q"
 
 
@@ -27,23 +27,23 @@ def walkthrough_items(measure: TextWidth) -> Iterator[Item]:
     port = names.index(_ON_THE_HINGE) + 1
     chapters = (
         ("Motion, root to tips",
-         "With accelerations of the free speeds left zero, every hinge hands the motion on.",
+         "With zero accelerations of the free speeds, the motion is passed from body to body.",
          forward, forward.definitions),
-        ("A body absorbed",
-         "Deviations delta a from that motion need the load f = S a + e at the input end. The body "
-         "alone brings its mass matrix to S, and to e what the motion above needs; what hangs on "
-         "it has added its own S and e before.",
+        ("Contribution of a body",
+         "Deviations delta a from that motion require the load f = S a + e at the input end. The "
+         "body adds its mass matrix to S, and to e the load that the motion above requires; the "
+         "outboard bodies have already added their S and e.",
          body, body.definitions),
         ("Across a hinge, tips to root",
          "On the free speeds the load is the effort tau, which gives udot = g - G a and leaves "
          "S_Q and e_Q to the inboard side.",
          condense, condense.definitions[:port]),
         ("The port",
-         "Turned to the axes of the parent and moved to its point P, they are added to its own.",
+         "Transformed to the axes of the parent and to its point P, they are added to its own.",
          condense, condense.definitions[port:]),
         ("Recovery, root to tips",
-         "At the root the deviation is known: it is zero on the ground. Every hinge finds its "
-         "accelerations and hands the deviation on.",
+         "At the root the deviation is zero. Every hinge computes its accelerations and passes "
+         "the deviation on to the outboard body.",
          recover, recover.definitions),
     )  # fmt: skip
     for title, explanation, derivation, equations in chapters:

@@ -1,4 +1,4 @@
-"""Names as people write them: rdd_IO is r with two dots and subscript IO, omegadot is omega-dot."""
+"""Parsing of names: rdd_IO is r with two dots and subscript IO, omegadot is ω̇."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DOTS = (("ddot", 2), ("dot", 1), ("dd", 2), ("d", 1))
 
 @dataclass(frozen=True)
 class SymbolName:
-    """base letter (or word, then `upright`), number of dots, subscript."""
+    """Base letter (or word, then `upright`), number of dots, subscript."""
 
     base: str
     dots: int = 0
@@ -27,12 +27,12 @@ class SymbolName:
     upright: bool = False
 
     def written(self) -> str:
-        """The name as it is written in code, dots aside."""
+        """Name as written in code, without dots."""
         return "_".join(filter(None, (self.base, self.subscript)))
 
 
 def parse_name(name: str) -> SymbolName:
-    """Split a port's or symbol's name into what is shown."""
+    """Split the name of a port or symbol into base, dots and subscript."""
     head, _, subscript = name.partition("_")
     base, dots = _split_dots(head)
     if is_letter(base):
@@ -45,7 +45,7 @@ def parse_name(name: str) -> SymbolName:
 
 
 def parse_author_name(name: str) -> SymbolName:
-    """A name that an author chose: a letter with its subscript, or the word as it is."""
+    """Name chosen by an author: a letter with its subscript, or the word unchanged."""
     head, _, subscript = name.partition("_")
     match = re.fullmatch(r"([A-Za-z]+?)(\d*)", head)
     if match and is_letter(match[1]):
@@ -61,7 +61,7 @@ def _split_dots(head: str) -> tuple[str, int]:
 
 
 def is_letter(text: str) -> bool:
-    """Whether this is one letter, Greek ones by their names."""
+    """Whether a text is one letter; Greek letters are given by name."""
     return len(text) == 1 or text in GREEK
 
 
@@ -69,7 +69,7 @@ _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def unit_text(unit: str) -> str:
-    """kg*m2 as kg·m²; a quantity without a unit shows a dash."""
+    """kg*m2 as kg·m²; a dash for a quantity without unit."""
     if not unit:
         return "–"
     text = re.sub(r"(?<=[A-Za-z])\^?(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPT), unit)

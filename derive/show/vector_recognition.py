@@ -1,6 +1,7 @@
-"""Finds vectors in explicit matrices: [0 -z y; ...] is shown as r~, [f_x - M b_x; ...] as f - M b.
+"""Recognition of vectors in explicit matrices: [0 -z y; ...] is shown as r~.
 
-Only what agrees identically, entry by entry, is replaced; anything else stays explicit.
+Also [f_x - M b_x; ...] as f - M b.  Only identities that hold entry by entry are replaced; anything
+else stays explicit.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from sympy.matrices.expressions.matexpr import MatrixElement
 
 from ..definition.notation import Matrix, Perp, Tilde, explicit
 
-#: Matrices with more operations than this are shown as they are.
+#: Matrices with more operations than this are shown unchanged.
 MAX_OPERATIONS = 1500
 
 
 class SymbolPart(sp.MatrixExpr):
-    """Consecutive rows and columns of a matrix symbol, kept by name (first row, first column)."""
+    """Consecutive rows and columns of a matrix symbol, by name (first row, first column)."""
 
     def __new__(
         cls, symbol: sp.MatrixSymbol, row: int, column: int, rows: int, columns: int
@@ -74,7 +75,7 @@ def recognise_matrix(matrix: sp.MatrixBase) -> sp.MatrixExpr | None:
 
 
 def _is_multilinear(entry: sp.Expr) -> bool:
-    """Sums and products of entries and symbols only: nothing that would grow when expanded."""
+    """Whether an entry has only sums and products of symbols, which do not grow on expansion."""
     if isinstance(entry, (sp.Add, sp.Mul)):
         return all(_is_multilinear(part) for part in entry.args)
     if isinstance(entry, sp.Abs):
@@ -117,7 +118,7 @@ def _term_owners(matrix: sp.MatrixBase) -> Iterator[tuple[sp.Basic, ...]]:
 
 
 def _owner_order(owner: sp.Basic) -> tuple[bool, str]:
-    """Levers and angular velocities before what they are crossed with."""
+    """Sort key: lever arms and angular velocities before the vectors that they multiply."""
     name = str(owner.symbol.name if isinstance(owner, SymbolPart) else owner.name)
     return not name.startswith(("r_", "omega", "w")), name
 
@@ -134,9 +135,9 @@ def _entry_owner(element: MatrixElement) -> sp.MatrixExpr | None:
 
 
 def _coefficient(matrix: Matrix, candidate: sp.MatrixExpr) -> sp.Expr:
-    """Scalar c for which c candidate may be a part of the matrix: read off one leading term."""
+    """Scalar c for which c candidate may be a part of the matrix, from one leading term."""
     explicit_entries = explicit(candidate).applyfunc(sp.expand)
-    # Off the diagonal a~ b~ and b~ a~ have no term in common, so look there first.
+    # Off the diagonal a~ b~ and b~ a~ have no term in common, so these entries come first.
     order = sorted(
         range(len(explicit_entries)),
         key=lambda k: explicit_entries.rows > 1 and k % (explicit_entries.cols + 1) == 0,
@@ -180,7 +181,7 @@ def _column_candidates(term: tuple[sp.Basic, ...]) -> Iterator[sp.MatrixExpr]:
 
 
 def _repeated_and_single(vectors: list[sp.Basic]) -> Iterator[tuple[sp.Basic, sp.Basic]]:
-    """The vector that occurs twice among three, and the other one."""
+    """Vector that occurs twice among three, and the other one."""
     for a in set(vectors):
         remaining = [v for v in vectors if v != a]
         if len(remaining) == 1:
