@@ -1,1 +1,1 @@
-"""Every element and kernel there is, and writing all of them to `generated/`."""
+"""Catalogue of all elements and kernels, and generation of `generated/`."""

@@ -1,7 +1,7 @@
-"""Kernels of a hinge that do in one what its own kernel and the steps for any hinge do apart.
+"""Kernels of a hinge that combine its own kernel with the generic steps of the sweep.
 
-They are those kernels replayed on one graph, where zeros and ones of the hinge's motion fold, and
-sines are taken once: nothing is derived anew.
+Those kernels are evaluated on one graph, where zeros and ones of the hinge's motion fold and sines
+are shared: no new derivation.
 """
 
 from __future__ import annotations
@@ -17,39 +17,43 @@ from mstmm.ir.inline import Inliner, Nodes, element_nodes
 from ..equations import riccati_sweep, tangent_hinge_elimination
 from ..lower.kernel_lowering import lower
 
-#: What changes along a direction of the steps for any hinge.
-_CHANGES = ("H", "v", "w", "c")
+#: Outputs of the hinge kernel that have a directional derivative in the generic steps.
+_CHANGED_OUTPUTS = ("H", "v", "w", "c")
 
 
 def across_kernels(hinge: KernelIR) -> Iterator[KernelIR]:
-    """`forward_kept` of a hinge, and its `directions` if it has speeds, by its kernel "hinge"."""
+    """`forward_kept` of a hinge, and `directions` if it has speeds, from its kernel "hinge"."""
     yield forward_kept(hinge)
-    if _length(hinge, "u"):
+    if _port_length(hinge, "u"):
         yield directions(hinge)
 
 
 def forward_kept(hinge: KernelIR) -> KernelIR:
-    """The motion across a hinge, and of the body behind it (`forward_generic`)."""
-    forward = _forward(_length(hinge, "u"))
+    """Motion across a hinge and of the outboard body (`forward_generic`)."""
+    forward = _forward_kernel(_port_length(hinge, "u"))
     graph = Graph()
-    found = _run(graph, hinge, guarded=True)
-    more = [port for port in forward.inputs if port.name not in found]
-    behind = Inliner(graph).run(forward, found | {p.name: element_nodes(graph, p) for p in more})
+    nodes = _hinge_nodes(graph, hinge, guarded=True)
+    more = [port for port in forward.inputs if port.name not in nodes]
+    body_nodes = Inliner(graph).run(
+        forward, nodes | {p.name: element_nodes(graph, p) for p in more}
+    )
     outputs = [*hinge.outputs, *forward.outputs]
     return graph.kernel(
-        "forward_kept", (*hinge.inputs, *more), outputs, _values(outputs, found | behind),
+        "forward_kept", (*hinge.inputs, *more), outputs,
+        _nested_values(outputs, nodes | body_nodes),
         purpose="motion across the hinge and of the body behind it", sources=hinge.sources,
     )  # fmt: skip
 
 
 def directions(hinge: KernelIR) -> KernelIR:
-    """B, G, W and H of all unknowns of a hinge that nobody imposes (`tangent_column`).
+    """B, G, W and H of all unknowns of a hinge without prescribed motion (`tangent_column`).
 
-    Coordinates follow unknown k by row k of `along`, or by 1 / sq where their rates are the speeds.
+    Coordinates change with unknown k by row k of `along`, or by 1 / sq where coordinate rates
+    equal the speeds.
     """
-    nu, nq = _length(hinge, "u"), _length(hinge, "q")
+    nu, nq = _port_length(hinge, "u"), _port_length(hinge, "q")
     graph = Graph()
-    found = _run(graph, hinge)
+    nodes = _hinge_nodes(graph, hinge)
     inputs = [
         Port("s", (nu,), "", "accelerations of the speeds"),
         Port("motion", (9,), "", "w, wd, and a of the body, own axes"),
@@ -61,10 +65,10 @@ def directions(hinge: KernelIR) -> KernelIR:
         Port("scale", (1,), "1/s", "and of its acceleration"),
         Port("sq", (1,), "1/s", "inverse time by which coordinates follow speeds"),
     ]
-    given = found | {port.name: element_nodes(graph, port) for port in inputs}
+    arguments = nodes | {port.name: element_nodes(graph, port) for port in inputs}
     rows: dict[str, list[Nodes]] = {"B": [], "G": [], "W": []}
     for k in range(nu):
-        for name, row in _direction(graph, hinge, given, k).items():
+        for name, row in _direction(graph, hinge, arguments, k).items():
             rows[name].append(row)
     outputs = [
         Port("B", (nu, 9), "", "motion along the unknowns, a row a direction"),
@@ -72,37 +76,47 @@ def directions(hinge: KernelIR) -> KernelIR:
         Port("W", (nu, nu), "", "slopes of the rows by load, rotors and laws"),
         next(port for port in hinge.outputs if port.name == "H"),
     ]
-    values: dict[str, object] = {**rows, **_values(outputs[3:], found)}
+    values: dict[str, object] = {**rows, **_nested_values(outputs[3:], nodes)}
     return graph.kernel(
         "directions", (*hinge.inputs, *inputs), outputs, values,
-        purpose="directions of the unknowns of the hinge", sources=_column(nu).sources,
+        purpose="directions of the unknowns of the hinge", sources=_column_kernel(nu).sources,
     )  # fmt: skip
 
 
 def _direction(
-    graph: Graph, hinge: KernelIR, given: Mapping[str, Nodes], k: int
+    graph: Graph, hinge: KernelIR, arguments: Mapping[str, Nodes], k: int
 ) -> dict[str, Nodes]:
     """Rows of B, G and W along unknown k."""
-    nu, nq = _length(hinge, "u"), _length(hinge, "q")
+    nu, nq = _port_length(hinge, "u"), _port_length(hinge, "q")
     run, zero = Inliner(graph).run, graph.constant(0)
-    straight = nq == nu and all(
-        graph.element("u", i).number == rate.number for i, rate in enumerate(given["qdot"])
+    rates_are_speeds = nq == nu and all(
+        graph.element("u", i).number == rate.number for i, rate in enumerate(arguments["qdot"])
     )
-    follows = given["along"][nq * k : nq * (k + 1)]
-    if straight:
-        follows = [1 / given["sq"][0] if i == k else zero for i in range(nq)]
-    seeds: dict[Node, Node | float] = {graph.element("q", i): d for i, d in enumerate(follows)}
-    seeds[graph.element("u", k)] = given["rate"][0]
-    changes = {f"d_{name}": derivatives(given[name], seeds) for name in (*_CHANGES, "R", "d")}
-    changes["d_s"] = [given["scale"][0] if i == k else zero for i in range(nu)]
-    known = {**given, **changes, "d_q": follows, "laws": given["laws"][nu * k : nu * (k + 1)]}
-    turned = run(_along(nu) if straight else _turned(), known)
-    column = run(_column(nu), {**known, **turned, "Q": run(_carrier(nu), given)["Q"]})
+    increments = arguments["along"][nq * k : nq * (k + 1)]
+    if rates_are_speeds:
+        increments = [1 / arguments["sq"][0] if i == k else zero for i in range(nq)]
+    seeds: dict[Node, Node | float] = {graph.element("q", i): d for i, d in enumerate(increments)}
+    seeds[graph.element("u", k)] = arguments["rate"][0]
+    changes = {
+        f"d_{name}": derivatives(arguments[name], seeds) for name in (*_CHANGED_OUTPUTS, "R", "d")
+    }
+    changes["d_s"] = [arguments["scale"][0] if i == k else zero for i in range(nu)]
+    values = {
+        **arguments,
+        **changes,
+        "d_q": increments,
+        "laws": arguments["laws"][nu * k : nu * (k + 1)],
+    }
+    displacement = run(_along_kernel(nu) if rates_are_speeds else _rotation_kernel(), values)
+    column = run(
+        _column_kernel(nu),
+        {**values, **displacement, "Q": run(_carrier_kernel(nu), arguments)["Q"]},
+    )
     return {"B": column["B"], "G": column["G"], "W": column["row"]}
 
 
-def _run(graph: Graph, hinge: KernelIR, guarded: bool = False) -> dict[str, Nodes]:
-    """The hinge's own inputs and outputs on a graph, with its guards where they are asked."""
+def _hinge_nodes(graph: Graph, hinge: KernelIR, guarded: bool = False) -> dict[str, Nodes]:
+    """Inputs and outputs of the hinge kernel on a graph; with its guards if `guarded`."""
     inputs = {port.name: element_nodes(graph, port) for port in hinge.inputs}
     messages = {s.code: s.message for s in hinge.statements if isinstance(s, Guard)}
 
@@ -112,12 +126,12 @@ def _run(graph: Graph, hinge: KernelIR, guarded: bool = False) -> dict[str, Node
     return inputs | Inliner(graph).run(hinge, inputs, guard if guarded else None)
 
 
-def _length(kernel: KernelIR, name: str) -> int:
+def _port_length(kernel: KernelIR, name: str) -> int:
     return next((int(port.length()) for port in kernel.inputs if port.name == name), 0)
 
 
-def _values(ports: Sequence[Port], nodes: Mapping[str, Nodes]) -> dict[str, object]:
-    """Numbers of ports, nested as their shapes are."""
+def _nested_values(ports: Sequence[Port], nodes: Mapping[str, Nodes]) -> dict[str, object]:
+    """Nodes of ports, nested as their shapes."""
 
     def nested(port: Port) -> object:
         row = nodes[port.name]
@@ -130,25 +144,25 @@ def _values(ports: Sequence[Port], nodes: Mapping[str, Nodes]) -> dict[str, obje
 
 
 @cache
-def _forward(nu: int) -> KernelIR:
+def _forward_kernel(nu: int) -> KernelIR:
     return lower(riccati_sweep.forward_generic(nu), "forward")
 
 
 @cache
-def _carrier(nu: int) -> KernelIR:
+def _carrier_kernel(nu: int) -> KernelIR:
     return lower(tangent_hinge_elimination.tangent_carrier(nu), "tangent_carrier")
 
 
 @cache
-def _column(nu: int) -> KernelIR:
+def _column_kernel(nu: int) -> KernelIR:
     return lower(tangent_hinge_elimination.tangent_column(nu), "tangent_column")
 
 
 @cache
-def _along(nu: int) -> KernelIR:
+def _along_kernel(nu: int) -> KernelIR:
     return lower(tangent_hinge_elimination.tangent_along(nu), "tangent_along")
 
 
 @cache
-def _turned() -> KernelIR:
+def _rotation_kernel() -> KernelIR:
     return lower(tangent_hinge_elimination.tangent_turned(), "tangent_turned")

@@ -1,4 +1,4 @@
-"""Element -> ElementSpec: derive and lower every kernel an element offers."""
+"""Element -> ElementSpec: derive and lower all kernels of an element."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ __all__ = [
 ]
 
 
-def _lowered(kernels: tuple[Kernel, ...], group: str = "") -> tuple[KernelIR, ...]:
+def _lower_kernels(kernels: tuple[Kernel, ...], group: str = "") -> tuple[KernelIR, ...]:
     return with_slopes(group, (kernel.ir() for kernel in kernels))
 
 
 def spec_of(element: Element) -> ElementSpec:
-    """Derive and lower the kernels of any element, built in or the user's."""
+    """Derive and lower the kernels of any element, built-in or user-defined."""
     return spec_from(element, kernels_of(element))
 
 
 def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
-    """The element with its kernels, once they are derived."""
+    """ElementSpec of an element and its derived kernels."""
     hinge = element if isinstance(element, Hinge) else None
-    lowered = _lowered(kernels, kind_of(element))
+    lowered = _lower_kernels(kernels, kind_of(element))
     return ElementSpec(
         kind_of(element),
         element.name,
@@ -75,7 +75,7 @@ def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
 
 
 def hinge_facts(hinge: Hinge, kernels: Sequence[KernelIR]) -> HingeProperties:
-    """What a hinge leaves free, by its kernel "hinge"."""
+    """Free directions and input keys of a hinge, from its kernel "hinge"."""
     motion = next(kernel for kernel in kernels if kernel.name == "hinge")
     return hinge_properties(
         motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame,
@@ -84,43 +84,48 @@ def hinge_facts(hinge: Hinge, kernels: Sequence[KernelIR]) -> HingeProperties:
 
 
 def all_facts(specs: Sequence[ElementSpec]) -> list[HingeProperties]:
-    """Facts of the built-in hinges, the fewest speeds first."""
-    known = {spec.name: spec.facts for spec in specs if spec.facts is not None}
+    """Properties of the built-in hinges, by increasing number of speeds."""
+    facts_by_name = {spec.name: spec.facts for spec in specs if spec.facts is not None}
     for hinge in builtin_hinges():
         if hinge.runs_as:
-            known[hinge.name] = replace(
-                known[hinge.runs_as], name=hinge.name, allows=hinge.allows, runs_as=hinge.runs_as
+            facts_by_name[hinge.name] = replace(
+                facts_by_name[hinge.runs_as],
+                name=hinge.name,
+                allows=hinge.allows,
+                runs_as=hinge.runs_as,
             )
-    return sorted(known.values(), key=lambda facts: (len(facts.speeds), facts.name))
+    return sorted(facts_by_name.values(), key=lambda facts: (len(facts.speeds), facts.name))
 
 
 def generic_spec(nu: int) -> ElementSpec:
-    """The sweep's steps for any hinge with `nu` free speeds."""
+    """Steps of the sweep for any hinge with `nu` free speeds."""
     return ElementSpec(
         "sweep", f"generic{nu}", f"sweep across a hinge with {nu} speeds", (), (), (),
-        _lowered(generic_kernels(nu), "generic"), riccati_sweep.SOURCES,
+        _lower_kernels(generic_kernels(nu), "generic"), riccati_sweep.SOURCES,
     )  # fmt: skip
 
 
 def shared_specs() -> list[ElementSpec]:
-    """What is no element of a scene: frames, laws, generic sweep."""
+    """Kernels that belong to no element of a scene: frames, laws, generic sweep."""
     plain = partial(ElementSpec, "sweep", coordinates=(), speeds=(), parameters=())
-    frames, laws = _lowered(frame_kernels(), "frames"), _lowered(law_kernels(), "laws")
-    screws = _lowered(screw_kernels())
+    frames, laws = _lower_kernels(frame_kernels(), "frames"), _lower_kernels(law_kernels(), "laws")
+    screws = _lower_kernels(screw_kernels())
     return [
         plain(name="frames", title="poses, points and loads", kernels=frames),
         plain(name="laws", title="laws on hinge coordinates", kernels=laws),
-        plain(name="beam", title="Euler-Bernoulli beam", kernels=_lowered(beam_kernels())),
-        plain(name="modal", title="flexible bodies", kernels=_lowered(modal_kernels(), "modal")),
-        plain(name="tangent", title="tangent of a step", kernels=_lowered(tangent_kernels())),
-        plain(name="loops", title="closed loops", kernels=_lowered(loop_kernels(), "loops")),
-        plain(name="qr", title="sweep as least squares", kernels=_lowered(qr_kernels())),
+        plain(name="beam", title="Euler-Bernoulli beam", kernels=_lower_kernels(beam_kernels())),
+        plain(
+            name="modal", title="flexible bodies", kernels=_lower_kernels(modal_kernels(), "modal")
+        ),
+        plain(name="tangent", title="tangent of a step", kernels=_lower_kernels(tangent_kernels())),
+        plain(name="loops", title="closed loops", kernels=_lower_kernels(loop_kernels(), "loops")),
+        plain(name="qr", title="sweep as least squares", kernels=_lower_kernels(qr_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(
             plain(
                 name=f"link_{name}",
                 title=title,
-                kernels=_lowered(link_kernels(name)),
+                kernels=_lower_kernels(link_kernels(name)),
             )
             for name, title in link_names().items()
         ),
@@ -129,15 +134,17 @@ def shared_specs() -> list[ElementSpec]:
 
 
 def all_specs() -> list[ElementSpec]:
-    """Everything that is generated: what runs need, compiled or replayed."""
-    made = [*(spec_of(e) for e in builtin_elements()), *shared_specs()]
-    return [*made, planar_spec(made), *(classical_spec(name) for name in RUN_ELEMENTS)]
+    """Everything that runs need, compiled or interpreted; this is what is generated."""
+    specs = [*(spec_of(e) for e in builtin_elements()), *shared_specs()]
+    return [*specs, planar_spec(specs), *(classical_spec(name) for name in RUN_ELEMENTS)]
 
 
 def on_demand_specs() -> list[ElementSpec]:
     """Classical matrices that no run needs, without their kernels."""
-    made = ((name, classical_derivation(name)) for name in CLASSICAL if name not in RUN_ELEMENTS)
+    derivations = (
+        (name, classical_derivation(name)) for name in CLASSICAL if name not in RUN_ELEMENTS
+    )
     return [
         ElementSpec("classical", name, matrix.title, (), (), (), (), matrix.sources)
-        for name, matrix in made
+        for name, matrix in derivations
     ]

@@ -1,4 +1,4 @@
-"""Regenerates the committed C, and compares it with what a fresh derivation gives."""
+"""Regenerate the committed C, and compare it with a fresh derivation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .element_specs import all_facts, all_specs, on_demand_specs
 
 
 def regenerate(folder: Path | str) -> list[Path]:
-    """Derive everything and write it; files of elements that are gone are removed."""
+    """Derive everything and write it; remove files of elements that no longer exist."""
     target, specs = Path(folder), all_specs()
     written = write_generated(specs, target, hinges=all_facts(specs), on_demand=on_demand_specs())
     for path in target.iterdir():
@@ -20,7 +20,7 @@ def regenerate(folder: Path | str) -> list[Path]:
 
 
 def differences(folder: Path | str) -> list[str]:
-    """Unified diffs between a fresh derivation and `folder`; empty if they agree byte for byte."""
+    """Unified diffs between a fresh derivation and `folder`; empty if identical."""
     target = Path(folder)
     specs = all_specs()
     fresh = generated_files(specs, hinges=all_facts(specs), on_demand=on_demand_specs())
@@ -29,7 +29,7 @@ def differences(folder: Path | str) -> list[str]:
         for path in sorted(target.iterdir())
         if path.suffix in (".c", ".h", ".json")
     }
-    found = []
+    diffs = []
     for name in sorted(fresh.keys() | stored.keys()):
         if fresh.get(name) != stored.get(name):
             lines = difflib.unified_diff(
@@ -39,5 +39,5 @@ def differences(folder: Path | str) -> list[str]:
                 f"derived/{name}",
                 lineterm="",
             )
-            found.append("\n".join(list(lines)[:40]))
-    return found
+            diffs.append("\n".join(list(lines)[:40]))
+    return diffs

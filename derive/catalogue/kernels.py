@@ -1,4 +1,4 @@
-"""Every kernel by its derivation: what is lowered, shown, and evaluated by the cross-check."""
+"""Table of all kernels by their derivations, for lowering, display and cross-checks."""
 
 from __future__ import annotations
 
@@ -89,12 +89,12 @@ FRAME_DERIVATIONS = (
     placed.placed_known,
 )
 
-#: Steps of the tangent for hinges with any number of speeds, and for those that have some.
-_ALONG_HINGES = (
+#: Tangent steps for hinges with any number of speeds, and for hinges with at least one.
+_TANGENT_STEPS = (
     tangent_hinge_elimination.tangent_carrier,
     tangent_hinge_elimination.tangent_column,
 )
-_OF_SPEEDS = (
+_TANGENT_SPEED_STEPS = (
     tangent_hinge_elimination.tangent_along,
     tangent_hinge_elimination.tangent_steady,
     tangent_hinge_elimination.tangent_turning,
@@ -119,12 +119,12 @@ class Kernel:
     guards: Guards = ()
 
     def ir(self) -> KernelIR:
-        """The kernel lowered."""
+        """Lowered kernel."""
         return lower(self.derivation, self.name, self.guards)
 
 
 def kernels_of(element: Element) -> tuple[Kernel, ...]:
-    """Kernels of any element, built in or the user's, in the order of the generated file."""
+    """Kernels of any element, built-in or user-defined, in the order of the generated file."""
     if isinstance(element, Hinge):
         return hinge_kernels(element)
     if isinstance(element, Body):
@@ -138,7 +138,7 @@ def kernels_of(element: Element) -> tuple[Kernel, ...]:
 
 
 def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
-    """`hinge` always; `forward`, `condense`, `recover` specialised to its motion subspace."""
+    """Kernels of a hinge, specialised to its motion subspace."""
     motion = motion_of(hinge)
     inputs = hinge_quantities(hinge)
     subspace, nu = motion.in_arrays(motion.subspace), motion.nu
@@ -158,11 +158,11 @@ def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
         )
     measure = hinge.singular_when(motion.q, motion.p)
     if measure is not None:
-        kernels.append(Kernel("singularity", _singularity(motion, measure)))
+        kernels.append(Kernel("singularity", _singularity_derivation(motion, measure)))
     return tuple(kernels)
 
 
-def _singularity(motion: HingeMotion, measure: sp.Expr) -> Derivation:
+def _singularity_derivation(motion: HingeMotion, measure: sp.Expr) -> Derivation:
     value = Quantity(vector("measure", 1), "", "tends to zero where the coordinates fail")
     return Derivation(
         motion.hinge.name,
@@ -175,7 +175,7 @@ def _singularity(motion: HingeMotion, measure: sp.Expr) -> Derivation:
 
 @cache
 def generic_kernels(nu: int) -> tuple[Kernel, ...]:
-    """The sweep's steps for any hinge with `nu` free speeds."""
+    """Steps of the sweep for any hinge with `nu` free speeds."""
     return (
         Kernel("forward", riccati_sweep.forward_generic(nu)),
         Kernel("condense", riccati_sweep.condense(nu), riccati_sweep.pivot_guards(nu)),
@@ -186,8 +186,8 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
         Kernel("push", multiple_right_hand_sides.push(nu)),
         Kernel("answer", multiple_right_hand_sides.answer(nu)),
         Kernel("qr_eliminate", qr_sweep.qr_eliminate(nu), qr_sweep.qr_guards(nu)),
-        *(Kernel(make.__name__, make(nu)) for make in _ALONG_HINGES),
-        *(Kernel(make.__name__, make(nu)) for make in _OF_SPEEDS if nu),
+        *(Kernel(make.__name__, make(nu)) for make in _TANGENT_STEPS),
+        *(Kernel(make.__name__, make(nu)) for make in _TANGENT_SPEED_STEPS if nu),
         Kernel("complement", complement(nu)),
         *(Kernel(make.__name__, make(nu)) for make in loop_closure.OF_SPEEDS if nu),
         *((Kernel("exerted", riccati_sweep.exerted(nu)),) if nu else ()),
@@ -198,12 +198,12 @@ def generic_kernels(nu: int) -> tuple[Kernel, ...]:
 
 
 def frame_kernels() -> tuple[Kernel, ...]:
-    """Poses, points and loads."""
+    """Kernels of poses, points and loads."""
     return tuple(Kernel(derivation.__name__, derivation()) for derivation in FRAME_DERIVATIONS)
 
 
 def law_kernels() -> tuple[Kernel, ...]:
-    """Laws on hinge coordinates."""
+    """Kernels of laws on hinge coordinates."""
     return (
         Kernel("linear", laws.coordinate_law(full=False)),
         Kernel("full", laws.coordinate_law(full=True)),
@@ -213,14 +213,14 @@ def law_kernels() -> tuple[Kernel, ...]:
 
 
 def screw_kernels() -> tuple[Kernel, ...]:
-    """Transport across axial screws."""
+    """Kernels of transport across axial screws."""
     return tuple(
         Kernel(name, derivation) for name, derivation in screw_transport.derivations().items()
     )
 
 
 def qr_kernels() -> tuple[Kernel, ...]:
-    """The sweep as least squares, but for the elimination of hinges."""
+    """Kernels of the least-squares sweep, except the elimination of hinges."""
     return tuple(
         Kernel(make.__name__, make())
         for make in (qr_sweep.factor, qr_sweep.bias, qr_sweep.merge, qr_sweep.restored)
@@ -228,7 +228,7 @@ def qr_kernels() -> tuple[Kernel, ...]:
 
 
 def loop_kernels() -> tuple[Kernel, ...]:
-    """Closed loops, but for what goes by the speeds of a hinge."""
+    """Kernels of closed loops, except those that depend on the number of hinge speeds."""
     return tuple(
         Kernel(make.__name__, make(), constraints.GUARDS.get(make.__name__, ()))
         for make in (*loop_closure.STEPS, *constraints.STEPS)
@@ -237,33 +237,32 @@ def loop_kernels() -> tuple[Kernel, ...]:
 
 @cache
 def links() -> Mapping[str, Hinge]:
-    """Built-in hinges that move about and along z alone, or turn about a point, by name."""
+    """Built-in hinges that move only about and along z, or rotate about a point, by name."""
     hinges = [element for element in builtin_elements() if isinstance(element, Hinge)]
     return {
         hinge.name: hinge for hinge in hinges
-        if _axial(hinge) or rotational.turns_about_a_point(hinge)
+        if _is_axial(hinge) or rotational.turns_about_a_point(hinge)
     }  # fmt: skip
 
 
-def _axial(hinge: Hinge) -> bool:
+def _is_axial(hinge: Hinge) -> bool:
     place = place_of(hinge)
     return place.nu > 0 and hinge.speeds is None and axial.along_z(place) is not None
 
 
-#: What follows the name of a hinge whose speed has a rotor, in that of its link.
+#: Suffix of the link name of a hinge whose speed has rotor inertia.
 ROTOR = "_rotor"
 
 
 def link_names() -> dict[str, str]:
-    """Name of every link, a hinge's with and without a rotor -> what it is of; hinges of several
-    speeds have none with rotors."""
-    found = {name: f"rigid body behind the {hinge.title}" for name, hinge in links().items()}
+    """Names of all links -> title; a hinge with one speed also has a link with rotor."""
+    titles = {name: f"rigid body behind the {hinge.title}" for name, hinge in links().items()}
     single = [name for name, hinge in links().items() if place_of(hinge).nu == 1]
-    return found | {f"{name}{ROTOR}": f"{found[name]} with a rotor" for name in single}
+    return titles | {f"{name}{ROTOR}": f"{titles[name]} with a rotor" for name in single}
 
 
 def link_kernels(name: str) -> tuple[Kernel, ...]:
-    """A rigid body behind a hinge, pass by pass; `name` is one of `link_names`."""
+    """Kernels of a rigid body outboard of a hinge; `name` is one of `link_names`."""
     hinge, rotor, body = links()[name.removesuffix(ROTOR)], name.endswith(ROTOR), RigidBody()
     motion = motion_of(hinge)
     guards = riccati_sweep.pivot_guards(
@@ -285,7 +284,7 @@ def link_kernels(name: str) -> tuple[Kernel, ...]:
 
 
 def modal_kernels() -> tuple[Kernel, ...]:
-    """Flexible bodies: residual, sections, condensation; n modes, known at run time."""
+    """Kernels of flexible bodies (n modes, run-time size): residual, sections, condensation."""
     turns = section.turn_guards()
     return (
         Kernel("residual", modal_residual.residual()),
@@ -327,14 +326,13 @@ def tangent_kernels() -> tuple[Kernel, ...]:
 
 
 def beam_kernels() -> tuple[Kernel, ...]:
-    """Beams: integrands per length, integrated along the beam when a scene is packed; dynamic
-    stiffness of vibrating ones."""
+    """Kernels of beams: integrands per length for packing, and dynamic stiffness."""
     derivations = beam_fields.KERNELS | beam_foreshortening.KERNELS | harmonic_stiffness.KERNELS
     return tuple(Kernel(name, make()) for name, make in derivations.items())
 
 
 def classical_kernel(name: str) -> Kernel:
-    """The classical transfer matrix `name`."""
+    """Kernel of the classical transfer matrix `name`."""
     derivation = classical_derivation(name)
     return Kernel("transfer", derivation, classical_guards(derivation))
 
@@ -343,14 +341,14 @@ Table = dict[tuple[str, str], Callable[[], tuple[Kernel, ...]]]
 
 
 def built_in() -> Table:
-    """(kind, name) -> its kernels, for everything that comes with the package."""
-    return _but_for_links() | {
+    """(kind, name) -> function that derives the kernels, for the whole package."""
+    return _kernels_without_links() | {
         ("sweep", f"link_{name}"): lambda name=name: link_kernels(name) for name in link_names()
     }
 
 
-def _but_for_links() -> Table:
-    """The same of what is named without a derivation."""
+def _kernels_without_links() -> Table:
+    """(kind, name) -> function, without links, whose names need a derivation."""
     table: Table = {
         (kind_of(e), e.name): lambda e=e: kernels_of(e)  # type: ignore[misc]
         for e in builtin_elements()
@@ -371,13 +369,13 @@ def _but_for_links() -> Table:
 
 
 def maker(kind: str, name: str) -> Callable[[], tuple[Kernel, ...]] | None:
-    """What makes the kernels of one built-in element; None if there is none."""
-    return _but_for_links().get((kind, name)) or built_in().get((kind, name))
+    """Function that derives the kernels of one built-in element; None if there is none."""
+    return _kernels_without_links().get((kind, name)) or built_in().get((kind, name))
 
 
 def built_in_kernels(kind: str, name: str) -> tuple[Kernel, ...]:
-    """Kernels of one built-in element.  ElementError if there is none."""
+    """Kernels of one built-in element.  Raises ElementError if there is none."""
     make = maker(kind, name)
     if make is None:
-        raise ElementError(f"there is no built-in {kind} called {name!r}")
+        raise ElementError(f'unknown built-in {kind} "{name}"')
     return make()

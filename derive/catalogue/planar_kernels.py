@@ -1,8 +1,8 @@
-"""The sweep in a plane: kernels of pins about parallel axes with what is across the plane left out.
+"""Kernels of a planar sweep: pins about parallel axes, without out-of-plane components.
 
-Where every hinge turns about z, motions lie in a plane, and the loads across it move nothing.  Of
-rotations two numbers are left, of motions and loads three, of S six.  Each kernel is that of any
-motion, replayed where these are all that there is, and its arrays hold these alone.
+Where every hinge turns about z, motions are planar and out-of-plane loads move nothing.  Rotations
+keep two numbers, motions and loads three, S six.  Each kernel is the spatial one evaluated with
+these components only, and its arrays store no others.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from mstmm.ir.inline import Nodes, element_nodes, specialise
 
 from ..schedule.planar_passes import LOAD
 
-#: Entries that are left of S, and of a direction in every row of W.
+#: In-plane entries of S, and of a direction in every row of W.
 _MASS = (0, 1, 5, 6, 10, 20)
 _DIRECTIONS = tuple(6 * row + entry for row in range(6) for entry in LOAD)
-#: (ports, their length) -> entries that are left; others have no axes.  Of the places of bodies
-#: the one across the plane stays, for forces of ends that lie apart.
-_LEFT: dict[tuple[str, int], tuple[int, ...]] = {
+#: (ports, their length) -> in-plane entries; ports not listed have no axes.  Body positions keep
+#: the out-of-plane coordinate, for forces whose ends are in different planes.
+_IN_PLANE_ENTRIES: dict[tuple[str, int], tuple[int, ...]] = {
     (name, length): left
     for names, length, left in (
         ("motion motion_I motion_C motion_B", 9, (2, 5, 6, 7)),
@@ -37,15 +37,15 @@ _LEFT: dict[tuple[str, int], tuple[int, ...]] = {
     for name in names.split()
 }  # fmt: skip
 _ROTATIONS = ("Rt", "Rc", "R_C", "A", "A_I", "A_C", "A_B")
-#: What is zero, by kernel: the way across a pin and what it prescribes, ends that do not deviate.
+#: Inputs that are zero, by kernel: position across a pin and its prescribed motion, end deviations.
 _ZERO = {
     "forward": "s", "velocity": "v_rel", "point": "delta gravity", "turning": "delta",
     "factor": "W",
 }  # fmt: skip
-#: What nobody asks for: a pin leaves P where its inboard point is.
-_UNASKED = {"forward": "r", "point": "a_K", "turning": "alpha_K"}
-#: Element -> its kernels that have an instance here.
-_TAKEN: dict[tuple[str, str], str] = {
+#: Outputs that are never used: P of a pin coincides with its inboard point.
+_UNUSED_OUTPUTS = {"forward": "r", "point": "a_K", "turning": "alpha_K"}
+#: Element -> its kernels that exist in planar form.
+_PLANAR_KERNELS: dict[tuple[str, str], str] = {
     ("hinge", "pin"): "forward",
     ("body", "rigid"): "inertia bias_load",
     ("sweep", "frames"): "pose velocity point turning end_frame applied_load",
@@ -55,52 +55,52 @@ _TAKEN: dict[tuple[str, str], str] = {
 
 
 def planar_spec(specs: Iterable[ElementSpec]) -> ElementSpec:
-    """The kernels in a plane, made of those in space."""
-    known = {(spec.kind, spec.name): spec for spec in specs}
+    """Planar kernels, made from the spatial ones."""
+    spec_by_key = {(spec.kind, spec.name): spec for spec in specs}
     kernels = tuple(
-        _in_plane(kernel)
-        for key, names in _TAKEN.items()
-        for kernel in known[key].kernels
+        _planar_kernel(kernel)
+        for key, names in _PLANAR_KERNELS.items()
+        for kernel in spec_by_key[key].kernels
         if kernel.name in names.split()
     )
     return ElementSpec("sweep", "planar_pin", "pins in a plane", (), (), (), kernels)
 
 
-def _in_plane(kernel: KernelIR) -> KernelIR:
-    zeros, unasked = (table.get(kernel.name, "").split() for table in (_ZERO, _UNASKED))
+def _planar_kernel(kernel: KernelIR) -> KernelIR:
+    zeros, unused = (table.get(kernel.name, "").split() for table in (_ZERO, _UNUSED_OUTPUTS))
 
-    def laid(port: Port) -> Port:
-        left = _left(port)
-        return port if left is None else replace(port, shape=(len(left),))
+    def planar_port(port: Port) -> Port:
+        entries_kept = _in_plane_entries(port)
+        return port if entries_kept is None else replace(port, shape=(len(entries_kept),))
 
-    def given(graph: Graph, port: Port) -> Nodes:
-        zero, one = graph.constant(0), graph.constant(1)
+    def input_nodes(graph: Graph, port: Port) -> Nodes:
+        zero, unit = graph.constant(0), graph.constant(1)
         if port.name == "H":  # about z
-            return [zero] * (port.length() - 1) + [one]
+            return [zero] * (port.length() - 1) + [unit]
         if port.name in zeros:
             return [zero] * port.length()
-        entries = element_nodes(graph, laid(port))
+        entries = element_nodes(graph, planar_port(port))
         if port.name in _ROTATIONS:
             cosine, sine = entries
-            return [cosine, -sine, zero, sine, cosine, zero, zero, zero, one]
-        left = _left(port)
-        if left is None:
+            return [cosine, -sine, zero, sine, cosine, zero, zero, zero, unit]
+        entries_kept = _in_plane_entries(port)
+        if entries_kept is None:
             return entries
-        found = [zero] * port.length()
-        for place, entry in zip(left, entries, strict=True):
-            found[place] = entry
-        return found
+        nodes = [zero] * port.length()
+        for index, entry in zip(entries_kept, entries, strict=True):
+            nodes[index] = entry
+        return nodes
 
-    def kept(port: Port, found: Nodes) -> list[Node] | None:
-        left = _left(port)
-        if port.name in unasked:
+    def output_nodes(port: Port, nodes: Nodes) -> list[Node] | None:
+        entries_kept = _in_plane_entries(port)
+        if port.name in unused:
             return None
-        return found if left is None else [found[place] for place in left]
+        return nodes if entries_kept is None else [nodes[index] for index in entries_kept]
 
-    made = specialise(kernel, given, kept, laid=laid)
-    return replace(made, purpose=f"{made.purpose}, in a plane")
+    planar = specialise(kernel, input_nodes, output_nodes, laid=planar_port)
+    return replace(planar, purpose=f"{planar.purpose}, in a plane")
 
 
-def _left(port: Port) -> tuple[int, ...] | None:
-    """Entries of an array that are left; None for all."""
-    return (0, 3) if port.name in _ROTATIONS else _LEFT.get((port.name, port.length()))
+def _in_plane_entries(port: Port) -> tuple[int, ...] | None:
+    """In-plane entries of an array; None if all are kept."""
+    return (0, 3) if port.name in _ROTATIONS else _IN_PLANE_ENTRIES.get((port.name, port.length()))

@@ -1,9 +1,9 @@
-"""Kernels that are differentiated: what the tangents of the sweep are made of.
+"""Differentiated kernels that form the tangents of the sweep.
 
-Behind a kernel `name` of the table stands `name_slope`, which gives the derivatives of its outputs
-along a direction; it is the kernel's own IR differentiated operation by operation (one-sided where
-a law has a kink), so that the equations of an element are stated once.  A slope kernel reads what
-the kernel reads, `d_PORT` for each of the ports that move, and gives `d_PORT` for its outputs.
+For a kernel `name` in the table, `name_slope` gives the derivatives of its outputs along a
+direction; it is the IR of the kernel differentiated operation by operation (one-sided at kinks of a
+law), so the equations of an element are stated once.  It reads the inputs of the kernel and
+`d_PORT` for each port that varies, and gives `d_PORT` for the outputs.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from .combined_hinge_kernels import across_kernels
 
 #: Suffix of the name of a differentiated kernel.
 SLOPE = "_slope"
-#: Kernels that give all derivatives of an output by a port, a row an entry of the port: name ->
+#: Kernels of full derivatives of an output by a port, one row per entry of the port: name ->
 #: (kernel, port, output), by kind of the element.
-_WHOLE = {
+_JACOBIANS = {
     "body": {"load_by_motion": ("bias_load", "motion", "e")},
     "hinge": {
         "rates_by_coordinates": ("hinge", "q", "qdot"),
@@ -28,9 +28,9 @@ _WHOLE = {
     },
 }
 
-#: kernel -> (ports that move, outputs wanted; none named: all), by kind and name of the element.
-#: "generic" stands for the steps for any hinge, "hinge", "body" and "force" for every element.
-_MOVING: dict[str, dict[str, tuple[str, str]]] = {
+#: kernel -> (ports that vary, outputs; "" for all), by kind and name of the element. "generic"
+#: means the steps for any hinge; "hinge", "body" and "force" mean every element of that kind.
+_DIFFERENTIATED: dict[str, dict[str, tuple[str, str]]] = {
     "hinge": {"hinge": ("q u", "")},
     "body": {"bias_load": ("motion", "")},
     "force": {"wrench": ("t A_F x_F v_F w_F A_T x_T v_T w_T effort", "F M")},
@@ -88,23 +88,22 @@ _MOVING: dict[str, dict[str, tuple[str, str]]] = {
 
 
 def with_slopes(group: str, kernels: Iterable[KernelIR]) -> tuple[KernelIR, ...]:
-    """The kernels, and behind them the slopes of those that are differentiated, and of hinges what
-    does several steps in one."""
+    """Kernels, then derivatives of those in the table, and combined kernels of hinges."""
     kernels = tuple(kernels)
-    moving = _MOVING.get(group, {})
-    slopes = [slope(k, *moving[k.name]) for k in kernels if k.name in moving]
-    known = {kernel.name: kernel for kernel in kernels}
-    for name, (kernel, port, output) in _WHOLE.get(group, {}).items():
-        if next(p for p in known[kernel].inputs if p.name == port).length():
-            slopes.append(replace(jacobian(known[kernel], port, output), name=name))
+    differentiated = _DIFFERENTIATED.get(group, {})
+    slopes = [slope(k, *differentiated[k.name]) for k in kernels if k.name in differentiated]
+    by_name = {kernel.name: kernel for kernel in kernels}
+    for name, (kernel, port, output) in _JACOBIANS.get(group, {}).items():
+        if next(p for p in by_name[kernel].inputs if p.name == port).length():
+            slopes.append(replace(jacobian(by_name[kernel], port, output), name=name))
     if group == "hinge":
-        slopes += across_kernels(known["hinge"])
+        slopes += across_kernels(by_name["hinge"])
     return (*kernels, *slopes)
 
 
 def slope(kernel: KernelIR, ports: str, outputs: str) -> KernelIR:
-    """One kernel differentiated; names of ports that it does not have are passed over."""
-    known = {port.name for port in kernel.inputs}
-    moving = [name for name in ports.split() if name in known]
-    found = differentiate(kernel, moving, outputs.split() or None, values=False, guards=False)
-    return replace(found, name=kernel.name + SLOPE)
+    """Differentiated kernel; names of ports that it does not have are ignored."""
+    input_names = {port.name for port in kernel.inputs}
+    varying = [name for name in ports.split() if name in input_names]
+    derivative = differentiate(kernel, varying, outputs.split() or None, values=False, guards=False)
+    return replace(derivative, name=kernel.name + SLOPE)

@@ -1,1 +1,1 @@
-"""What a definition and a derivation are written in: elements, notation, functions."""
+"""Language of definitions and derivations: elements, notation, functions."""

@@ -1,4 +1,4 @@
-"""Derivation: what a derivation hands on, in SymPy, before anything is lowered to code.
+"""Derivation: equations of one element in SymPy, before lowering to code.
 
 `premises` are the physical equations as the field states them; `definitions` are the explicit
 assignments that follow from them, in an order in which they can be evaluated.  Only the
@@ -18,8 +18,8 @@ import sympy as sp
 class Quantity:
     """A named array: MatrixSymbol `symbol` of shape (rows, columns); columns = 1 for a vector.
 
-    `symmetric` quantities are stored as their upper triangle, row by row.  Either extent may be a
-    symbol, the size that is known at run time; such quantities are stored full, symmetric or not.
+    `symmetric` quantities are stored as their upper triangle, row by row.  Either extent may be
+    a symbol, a run-time size; such quantities are stored full, symmetric or not.
     """
 
     symbol: sp.MatrixSymbol
@@ -42,23 +42,23 @@ class Quantity:
 
     @property
     def shape(self) -> tuple[int | str, int | str]:
-        """Rows and columns; a size known at run time by its name."""
+        """Rows and columns; a run-time size is given by its name."""
         rows, columns = (int(e) if e.is_Integer else str(e) for e in self.symbol.shape)
         return rows, columns
 
     @property
     def sized(self) -> bool:
-        """Whether an extent is known at run time only."""
+        """Whether an extent is a run-time size."""
         return any(isinstance(extent, str) for extent in self.shape)
 
 
 @dataclass(frozen=True)
 class Equation:
-    """left = right; for a definition `left` is the MatrixSymbol that `right` gives a value to.
+    """left = right; in a definition `left` is the MatrixSymbol that `right` defines.
 
-    `zeros` declares entries of `right` that vanish identically although no single term does; they
-    are not computed.  Of a `symmetric` one the upper half is computed and mirrored.  `computed` is
-    a shorter form of `right` that is lowered in its place.  The checks evaluate `right` as it is.
+    `zeros` lists entries of `right` that vanish identically although no single term does; they
+    are not computed.  If `symmetric`, the upper half is computed and mirrored.  `computed` is a
+    shorter form of `right` that is lowered in its place.  The checks evaluate `right` itself.
     """
 
     name: str
@@ -86,30 +86,30 @@ class Derivation:
 
     @property
     def size(self) -> sp.Symbol | None:
-        """The size that is known at run time; ValueError where there are two."""
+        """Run-time size; None without one.  Raises ValueError where there are two."""
         symbols = [q.symbol for q in (*self.inputs, *self.outputs)]
         symbols += [e.left for e in self.definitions]
-        found = {extent for s in symbols for extent in s.shape if not extent.is_Integer}
-        if len(found) > 1 or not all(extent.is_Symbol for extent in found):
+        sizes = {extent for s in symbols for extent in s.shape if not extent.is_Integer}
+        if len(sizes) > 1 or not all(extent.is_Symbol for extent in sizes):
             raise ValueError(
-                f"{self.element}: more than one run-time size: {sorted(map(str, found))}"
+                f"{self.element}: more than one run-time size: {sorted(map(str, sizes))}"
             )
-        return found.pop() if found else None
+        return sizes.pop() if sizes else None
 
     def at_size(self, n: int) -> Derivation:
         """The same derivation with the run-time size replaced by a number."""
         size = self.size
         if size is None:
             return self
-        known = {size: sp.Integer(n)}
+        replacements = {size: sp.Integer(n)}
 
         def quantity(q: Quantity) -> Quantity:
-            symbol = q.symbol.xreplace(known)
+            symbol = q.symbol.xreplace(replacements)
             return replace(q, symbol=symbol, symmetric=q.symmetric and not q.sized)
 
         def equation(e: Equation) -> Equation:
-            computed = None if e.computed is None else e.computed.xreplace(known)
-            left, right = e.left.xreplace(known), e.right.xreplace(known)
+            computed = None if e.computed is None else e.computed.xreplace(replacements)
+            left, right = e.left.xreplace(replacements), e.right.xreplace(replacements)
             return replace(e, left=left, right=right, computed=computed)
 
         return replace(
@@ -121,7 +121,7 @@ class Derivation:
         )
 
     def definition(self, name: str) -> sp.Basic:
-        """Right-hand side of the definition of `name`; KeyError if there is none."""
+        """Right-hand side of the definition of `name`.  Raises KeyError if there is none."""
         for equation in self.definitions:
             if str(getattr(equation.left, "name", equation.left)) == name:
                 return equation.right
@@ -129,11 +129,11 @@ class Derivation:
 
 
 class Solve(sp.MatrixExpr):
-    """A^-1 B.  Never inverted symbolically: lowered to an unrolled, guarded elimination.
+    """A^-1 B, never inverted symbolically: lowered to an unrolled, guarded elimination.
 
-    With `symmetric` (A positive definite) the elimination is LDL^T without pivoting; otherwise LU
-    with row exchange.  A pivot below 1e-13 of its own diagonal entry (of its row for LU) leaves the
-    kernel with a failure code.
+    With `symmetric` (A positive definite) the elimination is LDL^T without pivoting; otherwise
+    LU with row exchange.  A pivot below 1e-13 of its own diagonal entry (of its row for LU)
+    makes the kernel return a failure code.
     """
 
     def __new__(cls, matrix: sp.Basic, right: sp.Basic, symmetric: bool = False) -> Solve:
@@ -162,9 +162,10 @@ class Solve(sp.MatrixExpr):
 
 
 class Factor(sp.MatrixExpr):
-    """A = L diag(d) L^T of a symmetric positive definite A, in one matrix: 1 / d on the diagonal.
+    """A = L diag(d) L^T of a symmetric positive definite A, stored in one matrix.
 
-    Below the diagonal stands the unit lower triangular L; above it are zeros.  Guarded as `Solve`.
+    The diagonal holds 1 / d, the part below it the unit lower triangular L; zeros above.
+    Guarded as `Solve`.
     """
 
     def __new__(cls, matrix: sp.Basic) -> Factor:
@@ -184,9 +185,9 @@ class Factor(sp.MatrixExpr):
 
 
 class Triangular(sp.MatrixExpr):
-    """L^-1 B, or L^-T B if `transposed`: L is the strict lower triangle of `factor`, ones on top.
+    """L^-1 B, or L^-T B if `transposed`; L is the unit lower triangle of `factor`.
 
-    Lowered to unrolled substitution; the diagonal and what is above it are not read.
+    Lowered to unrolled substitution; the diagonal and the part above it are not read.
     """
 
     def __new__(cls, factor: sp.Basic, right: sp.Basic, transposed: bool = False) -> Triangular:
@@ -219,9 +220,9 @@ class Triangular(sp.MatrixExpr):
 class Triangle(sp.MatrixExpr):
     """The first `count` rows of R, where A = Q R with orthonormal Q.
 
-    R is upper triangular in the first `count` columns, with a diagonal that is nowhere negative:
-    R^T R = A^T A where A has no more rows.  Lowered to rotations of neighbouring rows, which mix
-    nothing that is known to be zero; rows of any size may stand side by side.
+    R is upper triangular in the first `count` columns, with a non-negative diagonal: R^T R =
+    A^T A if A has no more rows.  Lowered to rotations of neighbouring rows, which keep known
+    zeros; blocks of any size may be placed side by side.
     """
 
     def __new__(cls, matrix: sp.Basic, count: int | sp.Integer) -> Triangle:

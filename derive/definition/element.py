@@ -1,4 +1,4 @@
-"""What a new element declares: the seam for hinges, bodies and force elements of a researcher.
+"""Base classes of user-defined hinges, bodies and force elements.
 
 One class, one file, public names only (`from mstmm.derive import Hinge, Param`).  Coordinates,
 speeds and parameters are declared with units; `q`, `u` and `p` arrive as `Symbols`, indexable by
@@ -40,17 +40,18 @@ class Symbols:
     def __getattr__(self, name: str) -> sp.Symbol:
         if name in self.__dict__.get("_names", ()):
             return self._symbols[self._names.index(name)]
-        raise AttributeError(f"no {name!r} here; declared are {', '.join(self._names) or 'none'}")
+        declared = ", ".join(self._names) or "none"
+        raise AttributeError(f"{name!r} is not declared; declared names: {declared}")
 
 
 def describe_array(what: str, declared: tuple[Param, ...]) -> str:
-    """Meaning of an array that holds declared numbers, by their names and units in order."""
+    """Description of an array of declared quantities: names and units in order."""
     entries = ", ".join(f"{p.name} [{p.unit}]" if p.unit else p.name for p in declared)
     return f"{what}: {entries}" if entries else what
 
 
 class _Definition(NotebookDisplay):
-    """An element shows its equations, which are derived when somebody looks."""
+    """Base class of elements; displays equations, which are derived on first display."""
 
     name: ClassVar[str]
     title: ClassVar[str] = ""
@@ -65,21 +66,21 @@ class _Definition(NotebookDisplay):
         return self._equations("_repr_latex_")
 
     def _equations(self, how: str) -> str:
-        # by name: pages are made on floors above this one
+        # Imported by name, because `derive.show` is a higher layer.
         return str(getattr(import_module("mstmm").equations(self), how)())
 
 
 class Hinge(_Definition):
-    """Motion of the outboard point P against the inboard point Q (design: one hinge for all).
+    """Motion of the outboard point P relative to the inboard point Q.
 
-    `frame` says how its frame lies in a scene and `keys` which keys of a scene's hinge it reads
-    (`mstmm.ir.hinge_properties.FRAMES`); parameters that are no keys are given by name.  `allows`
-    says what moves, in a few words.
+    `frame` is the orientation of the hinge frame in a scene and `keys` are the keys of a
+    scene's hinge that it reads (`mstmm.ir.hinge_properties.FRAMES`); other parameters are given
+    by name.  `allows` describes the free motion in a few words.
 
     Subclasses declare the class attributes and `rotation` (P axes to Q axes, 3 x 3) and
-    `position` (P from Q in Q axes, 3 x 1), both in the hinge frame.  The motion subspace and the
-    bias acceleration follow from them.  Speeds are the rates of the coordinates unless `rates`
-    gives qdot = N(q) u.
+    `position` (P from Q in Q axes, 3 x 1), both in the hinge frame.  The motion subspace and
+    the bias acceleration follow from them.  Speeds are the rates of the coordinates unless
+    `rates` gives qdot = N(q) u.
     """
 
     name: ClassVar[str]
@@ -91,7 +92,7 @@ class Hinge(_Definition):
     allows: ClassVar[str] = ""
     frame: ClassVar[str] = "axis"
     keys: ClassVar[tuple[str, ...]] = ("axis",)
-    #: The hinge whose kernels move this one too, where two types differ in what a scene says alone.
+    #: Hinge whose kernels this one uses; the two differ only in their scene keys.
     runs_as: ClassVar[str] = ""
 
     def rotation(self, q: Symbols, p: Symbols) -> sp.Matrix:
@@ -103,43 +104,43 @@ class Hinge(_Definition):
         return sp.zeros(3, 1)
 
     def rates(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
-        """Coordinate rates from speeds; None where speeds are the rates."""
+        """Coordinate rates from speeds; None if speeds are the coordinate rates."""
         return None
 
     def subspace(self, q: Symbols, p: Symbols) -> sp.Matrix | None:
-        """H (6 x nu, rows v then w, P axes) if the author states it; checked, not trusted."""
+        """Stated H (6 x nu, rows v then w, P axes); checked against the derived one."""
         return None
 
     def bias(self, q: Symbols, u: Symbols, p: Symbols) -> sp.Matrix | None:
-        """Relative acceleration at zero udot (6 x 1, P axes) if stated; checked, not trusted."""
+        """Stated acceleration at zero udot (6 x 1, P axes); checked."""
         return None
 
     def singular_when(self, q: Symbols, p: Symbols) -> sp.Expr | None:
-        """An expression that tends to zero where the coordinates fail; the run warns below 1e-3."""
+        """Expression that tends to zero at a singularity; a run warns below 1e-3."""
         return None
 
 
 class Body(_Definition):
-    """A body stated by the force and moment its motion needs at its input end.
+    """A body defined by the force and moment that its motion requires at its input end.
 
     `residual` gives [force; moment about the input end] (6 x 1, body axes) that produces linear
-    acceleration a of the input end, angular acceleration alpha, at angular velocity w, without
-    external loads.  It is linear in a and alpha; its mass matrix is its derivative.  Axes and
-    origin are those of the body's table in the scene, by whichever end it is held.
+    acceleration a of the input end and angular acceleration alpha, at angular velocity w,
+    without external loads.  It is linear in a and alpha; its derivative is the mass matrix.
+    Axes and origin are those of the body's table in the scene, whichever end is the input end.
 
-    `kinetic_energy` is the energy that the residual's power feeds.  What something inside the body
-    spends (a motor that keeps a wheel at its rate) is neither in the one nor in the other.
+    `kinetic_energy` is the energy supplied by the power of the residual.  The power of internal
+    actuators (a motor that keeps a wheel at its rate) belongs to neither.
     """
 
     name: ClassVar[str]
     title: ClassVar[str] = ""
     parameters: ClassVar[tuple[Param, ...]] = ()
     sources: ClassVar[tuple[str, ...]] = ()
-    #: True if whoever packs the scene gives the parameters in hinge axes about the input end.
+    #: True if packing converts the parameters to hinge axes about the input end.
     in_hinge_axes: ClassVar[bool] = False
 
     def residual(self, a: sp.Matrix, alpha: sp.Matrix, w: sp.Matrix, p: Symbols) -> sp.Matrix:
-        """Needed [force; moment] at the input end, 6 x 1, body axes."""
+        """Required [force; moment] at the input end, 6 x 1, body axes."""
         raise NotImplementedError
 
     def kinetic_energy(self, v: sp.Matrix, w: sp.Matrix, p: Symbols) -> sp.Expr:
@@ -150,12 +151,12 @@ class Body(_Definition):
 class ForceElement(_Definition):
     """A massless element between two ends, here called `from` (F) and `to` (T).
 
-    `wrench` gives force (3 x 1) and moment (3 x 1) on the T end at its point, in F axes, from the
-    relative motion in F axes: position x of T from F, its rate v as seen from F, rotation R (T to
-    F axes), relative angular velocity w.  The F end receives the opposite, shifted by x.
-    `potential`, if there is one, is a function of x alone; what the wrench does beyond it counts as
-    work.  Where `deflection` is stated, `potential` is a function of that instead: its load follows
-    from it, and `wrench` gives what acts besides.
+    `wrench` gives force (3 x 1) and moment (3 x 1) on the T end at its point, in F axes, from
+    the relative motion in F axes: position x of T from F, its rate v as seen from F, rotation R
+    (T to F axes), relative angular velocity w.  The F end receives the opposite, shifted by x.
+    `potential`, if given, is a function of x only; loads of the wrench without potential count
+    as work.  If `deflection` is given, `potential` is a function of it: its load is derived,
+    and `wrench` gives only the remaining load.
     """
 
     name: ClassVar[str]
@@ -177,7 +178,7 @@ class ForceElement(_Definition):
         raise NotImplementedError
 
     def potential(self, x: sp.Matrix, p: Symbols) -> sp.Expr:
-        """Potential energy as a function of x, or of the deflection where that is stated, J."""
+        """Potential energy as a function of x, or of the deflection if that is given, J."""
         return sp.Integer(0)
 
     def deflection(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Matrix | None:
@@ -189,7 +190,7 @@ class ForceElement(_Definition):
         return None
 
     def defined_within(self, x: sp.Matrix, rotation: sp.Matrix, p: Symbols) -> sp.Basic | None:
-        """The same by x and the rotation."""
+        """Condition on x and the rotation under which the wrench is defined."""
         return self.defined_when(x, p)
 
 

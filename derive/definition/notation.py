@@ -1,6 +1,6 @@
-"""Premises as the field writes them: unevaluated cross products, explicit form, linear solution.
+"""Notation of premises: unevaluated cross products, explicit form, linear solution.
 
-Premises are kept in matrix symbols so that they can be shown; `explicit` spells them out entry by
+Premises are kept in matrix symbols so that they can be displayed; `explicit` expands them entry by
 entry, and `solve_linear` solves them for the matrices that the definitions state.
 """
 
@@ -15,7 +15,7 @@ from sympy.solvers.solveset import NonlinearError
 
 from .derivation import Equation, tilde
 
-#: An explicit matrix, as every derivation hands it on.
+#: Explicit matrix type of derivations.
 Matrix: TypeAlias = sp.ImmutableDenseMatrix
 
 
@@ -24,7 +24,7 @@ class Tilde(sp.MatrixExpr):
 
     def __new__(cls, vector: sp.Basic) -> Tilde:
         if tuple(vector.shape) != (3, 1):
-            raise ValueError(f"the cross-product matrix needs a 3 x 1 column, not {vector.shape}")
+            raise ValueError(f"cross-product matrix: expected a 3 x 1 column, found {vector.shape}")
         instance: Tilde = super().__new__(cls, vector)
         return instance
 
@@ -37,11 +37,11 @@ class Tilde(sp.MatrixExpr):
 
 
 class Perp(sp.MatrixExpr):
-    """A plane column turned by +90 degrees: b . Perp(a) is the plane cross product a x b."""
+    """Plane vector rotated by +90 degrees: b . Perp(a) is the plane cross product a x b."""
 
     def __new__(cls, vector: sp.Basic) -> Perp:
         if tuple(vector.shape) != (2, 1):
-            raise ValueError(f"a plane vector is a 2 x 1 column, not {vector.shape}")
+            raise ValueError(f"plane vector: expected a 2 x 1 column, found {vector.shape}")
         instance: Perp = super().__new__(cls, vector)
         return instance
 
@@ -59,10 +59,10 @@ def explicit(expression: sp.Basic) -> Matrix:
         first, *rest = (explicit(term) for term in expression.args)
         return Matrix(sum(rest, first))
     if isinstance(expression, sp.MatMul):
-        factor, (first, *others) = expression.as_coeff_matrices()
+        factor, (first, *factors) = expression.as_coeff_matrices()
         product = explicit(first)
-        for other in others:
-            product = product * explicit(other)
+        for operand in factors:
+            product = product * explicit(operand)
         return Matrix(factor * product)
     if isinstance(expression, sp.Transpose):
         return Matrix(explicit(expression.arg).T)
@@ -77,7 +77,7 @@ def explicit(expression: sp.Basic) -> Matrix:
 
 
 def residual(equation: Equation) -> Matrix:
-    """left - right, entry by entry (scalars as 1 x 1)."""
+    """left - right as a matrix of entries (scalars as 1 x 1)."""
     return Matrix(explicit(equation.left) - explicit(equation.right))
 
 
@@ -94,21 +94,21 @@ def solve_linear(
     entries = [entry for symbol in (*unknowns, *knowns) for entry in explicit(symbol)]
     names = {entry: sp.Dummy(str(entry)) for entry in entries}
     residuals = [entry for premise in premises for entry in residual(premise).xreplace(names)]
-    solved = [names[e] for symbol in unknowns for e in explicit(symbol)]
-    given = [names[e] for symbol in knowns for e in explicit(symbol)]
+    unknown_names = [names[e] for symbol in unknowns for e in explicit(symbol)]
+    known_names = [names[e] for symbol in knowns for e in explicit(symbol)]
     try:
-        coefficients, right = sp.linear_eq_to_matrix(residuals, [*solved, *given])
+        coefficients, right = sp.linear_eq_to_matrix(residuals, [*unknown_names, *known_names])
     except NonlinearError as error:
         raise ValueError(f"a premise is not linear in the state: {error}") from error
-    left = coefficients[:, : len(solved)]
-    rest = coefficients[:, len(solved) :].row_join(-right)
-    if left.rows != left.cols or left.applyfunc(sp.expand).rank() < left.cols:
+    matrix = coefficients[:, : len(unknown_names)]
+    right_side = coefficients[:, len(unknown_names) :].row_join(-right)
+    if matrix.rows != matrix.cols or matrix.applyfunc(sp.expand).rank() < matrix.cols:
         raise ValueError("the premises do not determine every unknown")
-    return Matrix(-left.LUsolve(rest)).applyfunc(sp.expand)
+    return Matrix(-matrix.LUsolve(right_side)).applyfunc(sp.expand)
 
 
 def matrix_symbols(expression: sp.Basic) -> set[sp.MatrixSymbol]:
-    """Matrix symbols an expression depends on, through their entries too."""
+    """Matrix symbols that an expression depends on, also through their entries."""
     return {
         *expression.atoms(sp.MatrixSymbol),
         *(e.parent for e in expression.atoms(MatrixElement)),

@@ -1,4 +1,4 @@
-"""Functions of SymPy that definitions may use, by the operation of the IR that computes them."""
+"""SymPy functions that definitions may use -> IR operation that computes them."""
 
 from __future__ import annotations
 

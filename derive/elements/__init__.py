@@ -1,1 +1,1 @@
-"""Built-in elements, one per file; the registry walks this folder."""
+"""Built-in elements, one per file; the registry imports every file of this folder."""

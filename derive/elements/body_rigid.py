@@ -16,7 +16,7 @@ PARAMETERS = (
 
 
 def inertia_tensor(p: Symbols) -> sp.Matrix:
-    """Symmetric tensor about the input end from the parameters."""
+    """Inertia tensor (3 x 3) about the input end from the parameters."""
     return sp.Matrix([[p.Jxx, p.Jxy, p.Jxz], [p.Jxy, p.Jyy, p.Jyz], [p.Jxz, p.Jyz, p.Jzz]])
 
 

@@ -1,11 +1,12 @@
-"""Bearing of a shaft that may spin: three forces by how two ends move apart, no moments."""
+"""Bearing without moments, with symmetric and cross-coupled matrices."""
 
 import sympy as sp
 
 from ..definition.element import ForceElement, Param, Symbols
 
 _THREE = range(3)
-#: Of symmetric matrices the upper triangle is given, of antisymmetric ones what is above it.
+#: Symmetric matrices are given by the upper triangle, antisymmetric ones by the part above the
+#: diagonal.
 _PAIRS = tuple((i, j) for i in _THREE for j in _THREE if i <= j)
 _ABOVE = tuple((i, j) for i in _THREE for j in _THREE if i < j)
 
@@ -32,8 +33,9 @@ def _matrix(p: Symbols, symmetric: int, antisymmetric: int | None) -> sp.Matrix:
 
 
 class Bearing(ForceElement):
-    """V = x^T K x / 2 - x^T preload, dampers -C v, and what cross-coupled matrices do besides,
-    -N x and -G v of antisymmetric N and G, which is work.
+    """Potential V = x^T K x / 2 - x^T preload and dampers -C v.
+
+    Antisymmetric N and G add the loads -N x and -G v, which count as work.
     """
 
     name = "bearing3"

@@ -1,4 +1,4 @@
-"""Bearing: a bushing whose stiffness and damping matrices need not be symmetric."""
+"""Bearing in six directions: a bushing with non-symmetric stiffness and damping."""
 
 import sympy as sp
 
@@ -6,9 +6,9 @@ from ..definition.element import ForceElement, Param, Symbols
 from . import force_bushing6
 
 _SIX = range(6)
-#: Of antisymmetric matrices the part above the diagonal is given, row by row.
+#: Antisymmetric matrices are given by the part above the diagonal, row by row.
 _ABOVE = tuple((i, j) for i in _SIX for j in _SIX if i < j)
-#: Parameters of a bushing, which come first.
+#: Parameters of a bushing; they precede those of the bearing.
 _SYMMETRIC = len(force_bushing6.Bushing.parameters)
 _UNITS = (("N/m", "N/rad", "N*m/rad"), ("N*s/m", "N*s/rad", "N*m*s/rad"))
 
@@ -32,8 +32,9 @@ def _antisymmetric(p: Symbols, first: int) -> sp.Matrix:
 
 
 class Bearing(ForceElement):
-    """A bushing with circulatory loads -N e and gyroscopic loads -G e' of antisymmetric matrices
-    besides: force N_x e and moment N_r e act along the axes as they are.  What -N e does is work.
+    """Bushing with circulatory loads -N e and gyroscopic loads -G e' of antisymmetric N and G.
+
+    The force N_x e and the moment N_r e act along the axes of F.  The load -N e counts as work.
     """
 
     name = "bearing6"

@@ -1,4 +1,4 @@
-"""Bushing: three forces and three moments by how two ends move apart and turn."""
+"""Bushing: three forces and three moments from the relative motion of two ends."""
 
 import sympy as sp
 
@@ -6,7 +6,7 @@ from ..definition.element import ForceElement, Param, Symbols
 from ..definition.rotation_derivatives import rotation_vector
 
 _SIX = range(6)
-#: Of symmetric matrices the upper triangle is given, row by row.
+#: Symmetric matrices are given by the upper triangle, row by row.
 _PAIRS = tuple((i, j) for i in _SIX for j in _SIX if i <= j)
 _UNITS = (("N/m", "N/rad", "N*m/rad"), ("N*s/m", "N*s/rad", "N*m*s/rad"))
 
@@ -24,8 +24,10 @@ def _symmetric(p: Symbols, first: int) -> sp.Matrix:
 
 
 class Bushing(ForceElement):
-    """V = e^T K e / 2 - e^T preload of the deflection e = [x; rotation vector], and dampers on the
-    rate of x and the relative angular velocity; the angle stays below 170 degrees.
+    """Potential V = e^T K e / 2 - e^T preload of the deflection e = [x; rotation vector].
+
+    Dampers act on the rate of x and the relative angular velocity; the angle stays below 170
+    degrees.
     """
 
     name = "bushing6"

@@ -7,7 +7,7 @@ from ..definition.quaternion import rate_of, rotation_of
 
 
 class Ball(Hinge):
-    """Relative angular velocity in outboard axes is the speed; no singular orientation."""
+    """Speeds are the relative angular velocity in outboard axes; no singular orientation."""
 
     name = "ball"
     title = "ball hinge"

@@ -4,7 +4,7 @@ from .hinge_free import Free
 
 
 class Elastic(Free):
-    """Moves as the free hinge does; the law of the scene holds it."""
+    """Motion of the free hinge; the law of the scene adds spring and damper."""
 
     name = "elastic"
     title = "elastic hinge"

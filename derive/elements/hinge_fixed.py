@@ -4,7 +4,7 @@ from ..definition.element import Hinge
 
 
 class Fixed(Hinge):
-    """Both ends move as one."""
+    """No coordinates; both ends coincide."""
 
     name = "fixed"
     title = "fixed hinge"

@@ -1,4 +1,4 @@
-"""Free hinge: six motions; the uniform way to give a body a free root."""
+"""Free hinge: six degrees of freedom; gives a body a free root."""
 
 import sympy as sp
 

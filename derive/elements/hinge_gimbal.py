@@ -6,7 +6,7 @@ from ..definition.element import Hinge, Param, Symbols, rotation_about
 
 
 class Gimbal(Hinge):
-    """R = Rz(angle3) Ry(angle2) Rx(angle1); fails where cos(angle2) = 0."""
+    """R = Rz(angle3) Ry(angle2) Rx(angle1); singular where cos(angle2) = 0."""
 
     name = "gimbal"
     title = "gimbal hinge (three angles)"

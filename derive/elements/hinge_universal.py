@@ -1,4 +1,4 @@
-"""Universal hinge: two rotations about crossing axes that meet in the hinge point."""
+"""Universal hinge: rotations about two axes that intersect in the hinge point."""
 
 import sympy as sp
 
@@ -6,10 +6,10 @@ from ..definition.element import Hinge, Param, Symbols, rotation_about
 
 
 class Universal(Hinge):
-    """First about z of the inboard frame, then about z of the outboard frame.
+    """Rotation about z of the inboard frame, then about z of the outboard frame.
 
-    The axes stand at the angle `alpha` to each other; both frames share their x axis (normal to
-    both axes) when the angles are zero.
+    `alpha` is the angle between the axes; both frames share their x axis (normal to both axes)
+    when the angles are zero.
     """
 
     name = "universal"

@@ -1,1 +1,1 @@
-"""Matrix equations become KernelIR."""
+"""Lowering of matrix equations to KernelIR."""

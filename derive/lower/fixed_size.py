@@ -1,7 +1,7 @@
-"""Lowers matrices of fixed sizes: products entry by entry, no inverse.
+"""Lowering of matrices of fixed size: products entry by entry, no inverse.
 
-Value numbering makes symmetric halves and repeated products one node; what no output needs is
-never emitted.  Zeros and ones of explicit matrices fold, so structure in gives sparsity out.
+Value numbering merges symmetric halves and repeated products into one node; nodes that no output
+needs are not emitted.  Zeros and ones of explicit matrices fold, so sparsity is kept.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from ..definition.sympy_functions import FUNCTIONS
 
 
 def port(quantity: Quantity) -> Port:
-    """How a quantity is stored: upper triangle, vector or row-major matrix."""
+    """Storage of a quantity: upper triangle, vector or row-major matrix."""
     rows, columns = quantity.shape
     shape: tuple[int | str, ...] = (rows, columns)
     if quantity.symmetric and isinstance(rows, int):
@@ -61,7 +61,7 @@ class Lowering:
     def _input(self, quantity: Quantity) -> NodeMatrix:
         name, rows, columns = quantity.name, quantity.rows, quantity.columns
         if quantity.symmetric:
-            return _mirror(self.graph.vector(name, rows * (rows + 1) // 2), rows)
+            return _full_symmetric(self.graph.vector(name, rows * (rows + 1) // 2), rows)
         if columns == 1:
             return [[node] for node in self.graph.vector(name, rows)]
         return self.graph.matrix(name, rows, columns)
@@ -76,7 +76,7 @@ class Lowering:
         self.known[str(equation.left.name)] = value
 
     def stored(self, quantity: Quantity) -> list[object]:
-        if quantity.rows * quantity.columns == 0:  # a hinge without speeds has empty gains
+        if quantity.rows * quantity.columns == 0:  # A hinge without speeds has empty gains.
             return [] if quantity.columns == 1 else [[] for _ in range(quantity.rows)]
         value = self.known[quantity.name]
         if quantity.symmetric:
@@ -183,11 +183,11 @@ class Lowering:
     # --- scalars --------------------------------------------------------------------------
 
     def scalar(self, expression: sp.Basic) -> Node:
-        found = self._scalars.get(expression)
-        if found is None:
-            found = self._scalar(expression)
-            self._scalars[expression] = found
-        return found
+        node = self._scalars.get(expression)
+        if node is None:
+            node = self._scalar(expression)
+            self._scalars[expression] = node
+        return node
 
     def _scalar(self, e: sp.Basic) -> Node:
         graph = self.graph
@@ -224,7 +224,7 @@ class Lowering:
         if op is None:
             op = "and" if isinstance(e, sp.And) else "or"
         if op == "mul":
-            return self._quotient(e)
+            return self._product_with_reciprocal(e)
         shared = _shared_factor(e) if op == "add" else sp.Integer(1)
         if shared != 1:
             rest = sp.Add(*(a / shared for a in e.args))
@@ -234,8 +234,8 @@ class Lowering:
             first = self.graph.call(op, first, node)
         return first
 
-    def _quotient(self, e: sp.Mul) -> Node:
-        """Products times the reciprocal of the denominator, which value numbering then shares."""
+    def _product_with_reciprocal(self, e: sp.Mul) -> Node:
+        """Product with the reciprocal of the denominator, so that it can be shared."""
         above, below = sp.fraction(e, exact=True)
         number, above = above.as_coeff_Mul()
         result = self.graph.constant(1)
@@ -269,7 +269,7 @@ class Lowering:
 
 
 def _shared_factor(total: sp.Add) -> sp.Rational:
-    """Number with which every term of a sum is multiplied (up to sign); SymPy distributes it."""
+    """Common factor of all terms of a sum (up to sign), which SymPy distributes."""
     factors = {abs(term.as_coeff_Mul()[0]) for term in total.args}
     factor = factors.pop()
     return factor if not factors and isinstance(factor, sp.Rational) else sp.Integer(1)
@@ -287,7 +287,7 @@ def _transpose(a: NodeMatrix) -> NodeMatrix:
     return [list(column) for column in zip(*a, strict=True)]
 
 
-def _mirror(upper: list[Node], n: int) -> NodeMatrix:
+def _full_symmetric(upper: list[Node], n: int) -> NodeMatrix:
     """Full symmetric matrix from its upper triangle, row by row."""
     full: NodeMatrix = [[upper[0]] * n for _ in range(n)]
     entries = iter(upper)

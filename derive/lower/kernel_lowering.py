@@ -1,4 +1,4 @@
-"""Lowers the definitions of a Derivation to a KernelIR."""
+"""Lowering of the definitions of a Derivation to a KernelIR."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Lowers matrices with a size that is known at run time: entry by entry, with loop indices.
+"""Lowering of matrices with a run-time size: entry by entry, with loop indices.
 
-An entry is asked for by its two indices, whole numbers or the letters of loops.  A product over the
-run-time size is a sum over the letter that its entry does not use, so an entry of an n x n matrix
-cannot be such a product.  Chains of products are taken in the order that multiplies least.
+An entry is requested by its two indices, integers or loop letters.  A product over the run-time
+size is a sum over the letter that its entry does not use, so an entry of an n x n matrix cannot be
+such a product.  Chains of products are evaluated in the order with fewest multiplications.
 
 Definitions that are outputs are stored, loop by loop, and read from memory afterwards; so outputs
 serve as workspace.  A definition that is no output, or that accumulates, is expanded wherever it is
@@ -28,12 +28,12 @@ from .fixed_size import Lowering, port
 Index = int | str
 Entries = Callable[[Index, Index], Node]
 
-#: What the order of a chain of products takes the run-time size for.
+#: Assumed run-time size when the order of a chain of products is chosen.
 _LIKELY_SIZE = 5
 
 
 class SizedLowering(Lowering):
-    """Lowering where some matrices have a run-time size; the others are lowered as ever."""
+    """Lowering with some matrices of run-time size; the others as in `Lowering`."""
 
     def __init__(self, derivation: Derivation, size: sp.Symbol) -> None:
         super().__init__(derivation)
@@ -43,15 +43,15 @@ class SizedLowering(Lowering):
         self.entries: dict[str, Entries] = {
             q.name: self._in_memory(self.ports[q.name]) for q in derivation.inputs if q.sized
         }
-        self._found: dict[tuple[sp.Basic, Index, Index], Node] = {}
-        self._whole: dict[sp.Basic, NodeMatrix] = {}
+        self._entry_nodes: dict[tuple[sp.Basic, Index, Index], Node] = {}
+        self._matrices: dict[sp.Basic, NodeMatrix] = {}
         self._fixed: dict[sp.Basic, bool] = {}
 
     # --- definitions ----------------------------------------------------------------------------
 
     def define(self, equation: Equation) -> None:
         left = equation.left
-        if all(map(_is_whole, left.shape)):
+        if all(map(_is_integer, left.shape)):
             super().define(equation)
             return
         name, right = str(left.name), equation.computed or equation.right
@@ -61,7 +61,7 @@ class SizedLowering(Lowering):
             raise ValueError(f"{name} is {left.shape}, its definition {right.shape}")
         output = self.outputs.get(name)
         if isinstance(right, Solve):
-            self._solved(name, output, right)
+            self._define_solution(name, output, right)
             return
         entries: Entries = lambda i, j: self.entry(right, i, j)  # noqa: E731
         self.entries[name] = entries
@@ -81,16 +81,16 @@ class SizedLowering(Lowering):
             return lambda i, j: self.graph.element(stored.name, i)
         return lambda i, j: self.graph.element(stored.name, i, j)
 
-    def _solved(self, name: str, output: Quantity | None, solve: Solve) -> None:
+    def _define_solution(self, name: str, output: Quantity | None, solve: Solve) -> None:
         if output is None or output.accumulate:
             raise NotImplementedError(
                 f"{name}: a run-time sized Solve defines an output that does not accumulate"
             )
         arrays = []
-        for what, array in (("matrix", solve.matrix), ("right-hand side", solve.right)):
+        for role, array in (("matrix", solve.matrix), ("right-hand side", solve.right)):
             if not isinstance(array, sp.MatrixSymbol) or str(array.name) not in self.ports:
                 raise NotImplementedError(
-                    f"{name}: the {what} of a run-time sized Solve must be an input, or an output "
+                    f"{name}: the {role} of a run-time sized Solve must be an input, or an output "
                     f"that is defined before and does not accumulate, not {array}"
                 )
             arrays.append(str(array.name))
@@ -106,50 +106,50 @@ class SizedLowering(Lowering):
     def matrix(self, expression: sp.Basic) -> NodeMatrix:
         if not getattr(expression, "is_Matrix", False) or self._is_fixed(expression):
             return super().matrix(expression)
-        found = self._whole.get(expression)
-        if found is None:
+        nodes = self._matrices.get(expression)
+        if nodes is None:
             rows, columns = expression.shape
-            if not (_is_whole(rows) and _is_whole(columns)):
-                raise NotImplementedError(f"{expression} has a run-time size where none can stand")
-            found = [
+            if not (_is_integer(rows) and _is_integer(columns)):
+                raise NotImplementedError(f"{expression}: expected a fixed size, found {self.size}")
+            nodes = [
                 [self.entry(expression, i, j) for j in range(int(columns))]
                 for i in range(int(rows))
             ]
-            self._whole[expression] = found
-        return [list(row) for row in found]
+            self._matrices[expression] = nodes
+        return [list(row) for row in nodes]
 
     def _is_fixed(self, expression: sp.Basic) -> bool:
-        """Whether nothing in an expression has the run-time size."""
-        found = self._fixed.get(expression)
-        if found is None:
-            found = self._fixed[expression] = self.size not in expression.atoms(sp.Symbol)
-        return found
+        """Whether no part of an expression has the run-time size."""
+        is_fixed = self._fixed.get(expression)
+        if is_fixed is None:
+            is_fixed = self._fixed[expression] = self.size not in expression.atoms(sp.Symbol)
+        return is_fixed
 
     def _scalar(self, e: sp.Basic) -> Node:
         if isinstance(e, sp.Sum):
             raise NotImplementedError(
-                f"{e}: state a product over {self.size} as a matrix of its own, not by its entries"
+                f"{e}: define a product over {self.size} as a separate matrix, not by its entries"
             )
         return super()._scalar(e)
 
     def _entry(self, e: sp.Basic) -> Node:
         if self._is_fixed(e.parent):
             return super()._entry(e)
-        if not all(map(_is_whole, e.parent.shape)):
-            raise NotImplementedError(f"{e}: one entry along the run-time size {self.size}")
+        if not all(map(_is_integer, e.parent.shape)):
+            raise NotImplementedError(f"{e}: expected no single entry along {self.size}")
         return self.entry(e.parent, int(e.i), int(e.j))
 
     # --- entries --------------------------------------------------------------------------------
 
     def entry(self, expression: sp.Basic, i: Index, j: Index) -> Node:
-        """One entry; letters stand for any index below the run-time size."""
+        """One entry; letters denote any index below the run-time size."""
         key = (expression, i, j)
-        found = self._found.get(key)
-        if found is None:
-            found = self._entry_of(expression, i, j)
+        node = self._entry_nodes.get(key)
+        if node is None:
+            node = self._entry_of(expression, i, j)
             if not isinstance(expression, sp.MatrixSymbol):
-                self._found[key] = found
-        return found
+                self._entry_nodes[key] = node
+        return node
 
     def _entry_of(self, e: sp.Basic, i: Index, j: Index) -> Node:
         if isinstance(e, sp.MatrixSymbol) and str(e.name) in self.entries:
@@ -172,41 +172,41 @@ class SizedLowering(Lowering):
         if isinstance(e, sp.BlockMatrix):
             return self._block_entry(e, i, j)
         if isinstance(e, MatrixSlice):
-            return self.entry(e.parent, _behind(e.rowslice, i), _behind(e.colslice, j))
+            return self.entry(e.parent, _parent_index(e.rowslice, i), _parent_index(e.colslice, j))
         raise NotImplementedError(f"cannot lower {e} ({type(e).__name__}) with a run-time size")
 
     def _fixed_matrix(self, e: sp.Basic) -> NodeMatrix:
-        found = self._whole.get(e)
-        if found is None:
-            found = self._whole[e] = super().matrix(e)
-        return found
+        nodes = self._matrices.get(e)
+        if nodes is None:
+            nodes = self._matrices[e] = super().matrix(e)
+        return nodes
 
     def _product_entry(self, e: sp.MatMul, i: Index, j: Index) -> Node:
         factor, matrices = e.as_coeff_matrices()
         extents = [matrices[0].rows, *(m.cols for m in matrices)]
-        split = _splits(tuple(int(x) if _is_whole(x) else _LIKELY_SIZE for x in extents))
+        split = _splits(tuple(int(x) if _is_integer(x) else _LIKELY_SIZE for x in extents))
 
         def part(first: int, last: int, i: Index, j: Index) -> Node:
             if first == last:
                 return self.entry(matrices[first], i, j)
             key = (sp.MatMul(*matrices[first : last + 1], evaluate=False), i, j)
-            found = self._found.get(key)
-            if found is None:
+            node = self._entry_nodes.get(key)
+            if node is None:
                 middle = split[first, last]
-                found = self._contracted(
+                node = self._inner_sum(
                     e, extents[middle + 1], i, j,
                     lambda s: part(first, middle, i, s) * part(middle + 1, last, s, j),
                 )  # fmt: skip
-                self._found[key] = found
-            return found
+                self._entry_nodes[key] = node
+            return node
 
         return self.scalar(factor) * part(0, len(matrices) - 1, i, j)
 
-    def _contracted(
+    def _inner_sum(
         self, e: sp.Basic, extent: sp.Expr, i: Index, j: Index, term: Callable[[Index], Node]
     ) -> Node:
         """Sum of `term` over the inner extent of a product."""
-        if _is_whole(extent):
+        if _is_integer(extent):
             total = self.graph.constant(0)
             for s in range(int(extent)):
                 total = total + term(s)
@@ -223,15 +223,15 @@ class SizedLowering(Lowering):
         blocks = e.blocks
         heights = [blocks[r, 0].rows for r in range(blocks.rows)]
         widths = [blocks[0, c].cols for c in range(blocks.cols)]
-        row, i = self._block_place(e, heights, i)
-        column, j = self._block_place(e, widths, j)
+        row, i = self._block_position(e, heights, i)
+        column, j = self._block_position(e, widths, j)
         return self.entry(blocks[row, column], i, j)
 
-    def _block_place(self, e: sp.Basic, extents: list[sp.Expr], i: Index) -> tuple[int, Index]:
-        """Which block an index meets, and the index within it."""
+    def _block_position(self, e: sp.Basic, extents: list[sp.Expr], i: Index) -> tuple[int, Index]:
+        """Block that contains an index, and the index within it."""
         if len(extents) == 1:
             return 0, i
-        if not all(map(_is_whole, extents)):
+        if not all(map(_is_integer, extents)):
             raise NotImplementedError(
                 f"{e}: a run-time size cannot share an axis with other blocks"
             )
@@ -242,23 +242,23 @@ class SizedLowering(Lowering):
 
 
 def _values(stored: Port, entries: Entries) -> object:
-    """What `Graph.store` takes: one value along a run-time size, a list along a fixed one."""
+    """Argument of `Graph.store`: one value along a run-time size, a list along a fixed one."""
     letters = iter(LOOPS)
     axes: list[list[Index]] = [
         [next(letters)] if isinstance(extent, str) else list(range(extent))
         for extent in stored.shape
     ]
     rows, columns = axes if len(axes) == 2 else (axes[0], [0])
-    whole: list[object] = []
+    rows_of_values: list[object] = []
     for i in rows:
         row: list[object] = [entries(i, j) for j in columns]
         alone = len(axes) == 1 or isinstance(stored.shape[1], str)
-        whole.append(row[0] if alone else row)
-    return whole[0] if isinstance(stored.shape[0], str) else whole
+        rows_of_values.append(row[0] if alone else row)
+    return rows_of_values[0] if isinstance(stored.shape[0], str) else rows_of_values
 
 
-def _behind(piece: tuple[sp.Expr, sp.Expr, sp.Expr], i: Index) -> Index:
-    """Index in the whole of index `i` in a slice (start, stop, step)."""
+def _parent_index(piece: tuple[sp.Expr, sp.Expr, sp.Expr], i: Index) -> Index:
+    """Index in the whole matrix of index `i` of a slice (start, stop, step)."""
     if isinstance(i, int):
         return int(piece[0]) + int(piece[2]) * i
     if piece[0] != 0 or piece[2] != 1:
@@ -266,14 +266,14 @@ def _behind(piece: tuple[sp.Expr, sp.Expr, sp.Expr], i: Index) -> Index:
     return i
 
 
-def _is_whole(extent: object) -> bool:
-    """Whether an extent is a number; SymPy hands out its own and Python's."""
+def _is_integer(extent: object) -> bool:
+    """Whether an extent is an integer, of SymPy or of Python."""
     return bool(sp.sympify(extent).is_Integer)
 
 
 @cache
 def _splits(extents: tuple[int, ...]) -> dict[tuple[int, int], int]:
-    """Where to split every part of a chain of products so that it multiplies least."""
+    """Best split of every part of a chain of products: fewest multiplications."""
     count = len(extents) - 1
     cost: dict[tuple[int, int], int] = {(i, i): 0 for i in range(count)}
     split: dict[tuple[int, int], int] = {}

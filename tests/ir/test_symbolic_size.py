@@ -281,7 +281,7 @@ def test_what_cannot_be_lowered_says_why() -> None:
          (number,)),
         ("not by its entries", [(number, sp.ImmutableDenseMatrix([(eta.T * A * eta)[0, 0]]))],
          (number,)),
-        ("one entry along the run-time size n", [(number, sp.ImmutableDenseMatrix([eta[0, 0]]))],
+        ("expected no single entry along n", [(number, sp.ImmutableDenseMatrix([eta[0, 0]]))],
          (number,)),
         ("share an axis", [(column, sp.BlockMatrix([[C, w]])[:, :n].T * w)], (column,)),
         ("Inverse", [(column, B.I * eta)], (column,)),
