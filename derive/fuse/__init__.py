@@ -1,1 +1,1 @@
-"""The sweep of one scene replayed on the graph.  No SymPy: somebody waits."""
+"""Code of one scene from its sweep on an expression graph; runs without SymPy."""

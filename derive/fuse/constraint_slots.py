@@ -1,6 +1,6 @@
-"""Slots of closed loops as nodes: columns, known parts and entries of L of the rows.
+"""Slots of closed loops as graph nodes: row columns, known parts and entries of L.
 
-A column is kept body by body, since every hinge that it crosses makes another of it.
+A column is stored per body, because each hinge that it crosses transforms it.
 """
 
 from __future__ import annotations
@@ -20,133 +20,141 @@ from mstmm.ir.scene_structure import (
 
 from .slot_values import Slots, Subject
 
-#: Whose entry of L a slot is: fields of the subject.
-_PAIRS = {
+#: Fields of the subject that index the entry of L which a slot holds.
+_ENTRY_INDICES = {
     "row.pivot": ("row", "row"), "other.L": ("row", "other"), "second.L": ("row", "second"),
     "both.L": ("other", "second"), "pair.L": ("row", "other"), "bent_pair.L": ("row", "other"),
 }  # fmt: skip
-#: On which body a slot has a column, and of which row.
-_COLUMNS = {
+#: Body role and row of each slot that holds a column.
+_COLUMN_SLOTS = {
     "row.K": ("meeting", "row"), "other.K": ("meeting", "other"), "pending.K": ("body", "row"),
     "pending.onward": ("parent", "row"), "side.inner": ("parent", "row"),
     "side.outer": ("outboard", "row"), "own.inner": ("parent", "row"),
     "own.outer": ("outboard", "row"), "bent.K": ("body", "row"),
 }  # fmt: skip
-#: What of a row on the modes of the flexible body at hand a slot is, and of which row.
-_ON_MODES = {
+#: Quantity (K_f or Y) and row of each slot that couples a row to the modes of a flexible body.
+_MODAL_SLOTS = {
     "pending.modes": ("K_f", "row"), "bent.modes": ("K_f", "row"),
     "bent_before.modes": ("K_f", "other"), "bent.y": ("Y", "row"),
 }  # fmt: skip
-#: Numbers of one row, by the owner that tells which.
-_OF_ROW = {
+#: Slot owner -> subject field that identifies the row.
+_ROW_FIELDS = {
     "row": "row", "line": "row", "pending": "row", "own": "row", "coupling": "row",
     "bent": "row", "other": "other", "before": "other",
 }  # fmt: skip
-#: A pivot that nothing makes count.
-_NEVER = 1e300
+#: Pivot value below every floor, so that its row is never active.
+_INACTIVE_PIVOT = 1e300
 
 
 class RowSlots(Slots):
-    """Slots, those of rows among them; `level` is what is corrected of closed loops, "" nothing."""
+    """Slots including those of constraint rows.
+
+    `level` is the corrected quantity of closed loops: "gaping", "slipping" or "" (none).
+    """
 
     level = ""
 
     def closure(self) -> ClosureStructure | None:
-        """The closure whose frame the body at hand is."""
+        """Closure whose frame is the current body; None if there is none."""
         return closure_at(self.state.structure, self.index)
 
     def row(self) -> RowStructure:
-        """The row at hand."""
+        """Current row."""
         return self.state.structure.rows[self.at.row]
 
     def closed_by(self, kind: str) -> bool:
-        """Whether what closes here is of this kind."""
+        """Whether the current body has a closure of this kind."""
         closure = self.closure()
         return closure is not None and closure.kind == kind
 
     def rests(self) -> bool:
-        """Whether nothing is asked of the row at hand, or nothing moves it."""
+        """Whether the current row is inactive: no condition on it, or a zero pivot."""
         if self.level == "gaping" and self.row().of_speeds:
             return True
         return self.get("row.pivot", 1)[0].value == 0
 
     def is_coupled(self) -> bool:
-        """Whether the row at hand is a coupling of the speeds of the hinge at hand."""
+        """Whether the current row is a speed coupling that includes the current hinge."""
         return any(
-            one.row == self.at.row and self.index in dict(one.columns)
-            for one in self.state.structure.couplings
+            coupling.row == self.at.row and self.index in dict(coupling.columns)
+            for coupling in self.state.structure.couplings
         )
 
     def met(self, of: str) -> Iterator[Subject]:
-        """The subjects of `Each`."""
+        """Subjects that a `ForEach` step visits."""
         at, rows = self.at, self.state.structure.rows
         if of in ("closings", "openings"):
-            here = [number for number, row in enumerate(rows) if row.body == self.index]
-            for number in here if of == "closings" else reversed(here):
-                yield row_subject(rows, number)
+            rows_of_body = [
+                row_index for row_index, row in enumerate(rows) if row.body == self.index
+            ]
+            for row_index in rows_of_body if of == "closings" else reversed(rows_of_body):
+                yield row_subject(rows, row_index)
         elif of == "pending":
-            yield from (replace(at, row=number) for number in self.body.pending)
+            yield from (replace(at, row=row_index) for row_index in self.body.pending)
         elif of == "bent":
-            yield from (replace(at, row=number) for number in self.body.bent)
+            yield from (replace(at, row=row_index) for row_index in self.body.bent)
         elif of in ("before", "bent_before"):
             passing = self.body.pending if of == "before" else self.body.bent
-            up_to = passing.index(at.row) + 1
-            yield from (replace(at, other=number) for number in passing[:up_to])
+            end = passing.index(at.row) + 1
+            yield from (replace(at, other=row_index) for row_index in passing[:end])
         elif of == "others":
-            yield from (replace(at, other=number) for number in self.row().others)
+            yield from (replace(at, other=row_index) for row_index in self.row().others)
         elif of == "own":
-            named = (one.row for one in self.state.structure.couplings for body, _ in one.columns
-                     if body == self.index)  # fmt: skip
-            yield from (replace(at, row=number) for number in named if number >= 0)
+            own_rows = (
+                coupling.row
+                for coupling in self.state.structure.couplings
+                for body, _ in coupling.columns
+                if body == self.index
+            )
+            yield from (replace(at, row=row_index) for row_index in own_rows if row_index >= 0)
         elif of == "seconds":
-            up_to = self.row().others.index(at.other) + 1
-            yield from (replace(at, second=number) for number in self.row().others[:up_to])
+            end = self.row().others.index(at.other) + 1
+            yield from (replace(at, second=row_index) for row_index in self.row().others[:end])
         else:
             closure = self.closure()
             assert closure is not None
-            for direction, number in enumerate(closure.rows):
-                if number >= 0:
-                    yield replace(at, row=number, direction=direction)
+            for direction, row_index in enumerate(closure.rows):
+                if row_index >= 0:
+                    yield replace(at, row=row_index, direction=direction)
 
     def _key(self, slot: str) -> Hashable:
         at = self.at
-        if slot in _PAIRS:
-            return ("L", *sorted(getattr(at, whose) for whose in _PAIRS[slot]))
-        if slot in _COLUMNS:
-            role, whose = _COLUMNS[slot]
-            return "K", at.roles[role], getattr(at, whose)
-        if slot in _ON_MODES:
-            name, whose = _ON_MODES[slot]
-            return name, self.frame, getattr(at, whose)
+        if slot in _ENTRY_INDICES:
+            return ("L", *sorted(getattr(at, field) for field in _ENTRY_INDICES[slot]))
+        if slot in _COLUMN_SLOTS:
+            role, field = _COLUMN_SLOTS[slot]
+            return "K", at.roles[role], getattr(at, field)
+        if slot in _MODAL_SLOTS:
+            name, field = _MODAL_SLOTS[slot]
+            return name, self.frame, getattr(at, field)
         owner, _, name = slot.partition(".")
-        if owner in _OF_ROW:
+        if owner in _ROW_FIELDS:
             body = self.index if name in ("y", "z", "tau") else None
-            return name, body, getattr(at, _OF_ROW[owner])
+            return name, body, getattr(at, _ROW_FIELDS[owner])
         return super()._key(slot)
 
-    def _given(self, slot: str) -> Nodes:
+    def _scene_data(self, slot: str) -> Nodes:
         f = self.state
-        if slot in _PAIRS:
-            return self._entry(*(getattr(self.at, whose) for whose in _PAIRS[slot]))
+        if slot in _ENTRY_INDICES:
+            return self._entry(*(getattr(self.at, field) for field in _ENTRY_INDICES[slot]))
         if slot == "row.floor":
             return f.entries(self.row().floor) or f.zeros(1)
-        if slot in _COLUMNS:
+        if slot in _COLUMN_SLOTS:
             return f.zeros(6)
-        if slot in _ON_MODES:
+        if slot in _MODAL_SLOTS:
             return f.zeros(self.modal.n)
-        if slot.partition(".")[0] in _OF_ROW:
+        if slot.partition(".")[0] in _ROW_FIELDS:
             return f.zeros(1)
-        return super()._given(slot)
+        return super()._scene_data(slot)
 
-    def _entry(self, one: int, other: int) -> Nodes:
-        """An entry of L before anything is added: a rotor gives way on its own row, and one at rest
-        is below every floor."""
+    def _entry(self, row_index: int, column_index: int) -> Nodes:
+        """Initial entry of L: 1 / `soft` of a soft row, -`_NEVER` for a rotor at rest."""
         f = self.state
-        row = f.structure.rows[one]
-        soft = f.entries(row.soft) if one == other else []
-        if one == other and row.rest >= 0:
-            rests = f.graph.call("lt", f.zero, f.memory[row.rest])
-            return [f.graph.select(rests, f.graph.constant(-_NEVER), f.zero)]
+        row = f.structure.rows[row_index]
+        soft = f.entries(row.soft) if row_index == column_index else []
+        if row_index == column_index and row.rest >= 0:
+            is_at_rest = f.graph.call("lt", f.zero, f.memory[row.rest])
+            return [f.graph.select(is_at_rest, f.graph.constant(-_INACTIVE_PIVOT), f.zero)]
         return [f.one / soft[0]] if soft else f.zeros(1)
 
     def _closure(self, name: str) -> Nodes:
@@ -158,33 +166,36 @@ class RowSlots(Slots):
 
 
 def closure_at(structure: Structure, index: int) -> ClosureStructure | None:
-    """The closure whose frame the body at a place is; None for other bodies."""
-    return next((one for one in structure.closures if one.frame == index), None)
+    """Closure whose frame is the body with this index; None for other bodies."""
+    return next((closure for closure in structure.closures if closure.frame == index), None)
 
 
-def row_subject(rows: tuple[RowStructure, ...], number: int) -> Subject:
-    """A row, on the body where it closes."""
-    body = rows[number].body
-    return Subject({"body": body, "meeting": body}, row=number)
+def row_subject(rows: tuple[RowStructure, ...], index: int) -> Subject:
+    """Subject of a row, at the body where it closes."""
+    body = rows[index].body
+    return Subject({"body": body, "meeting": body}, row=index)
 
 
 def coupling_inputs(slots: RowSlots) -> Iterator[tuple[CouplingStructure, Node]]:
-    """Couplings, with what each lacks at the level at hand; their numbers are put where rows read
-    them."""
+    """Yield couplings with their errors at the current level; fill the slots that rows read."""
     state, level = slots.state, {"gaping": "gap", "slipping": "slip"}.get(slots.level, "drift")
     if state.structure.coupled is None:
         return
     numbers = state.expression(state.structure.coupled)
-    for one in state.structure.couplings:
-        found = dict(zip(COUPLING_NUMBERS, numbers[one.first :], strict=False))
-        lack = found[level]
+    for coupling in state.structure.couplings:
+        values = dict(zip(COUPLING_NUMBERS, numbers[coupling.first :], strict=False))
+        error = values[level]
         if level == "gap":
-            lack = state.zero if one.of_speeds else lack - sum(state.entries(one.kept), state.zero)
-        if one.row >= 0:
-            for body, at in one.columns:
-                slots.enter(Subject({"body": body}, row=one.row))
+            error = (
+                state.zero
+                if coupling.of_speeds
+                else error - sum(state.entries(coupling.kept), state.zero)
+            )
+        if coupling.row >= 0:
+            for body, at in coupling.columns:
+                slots.enter(Subject({"body": body}, row=coupling.row))
                 nu = state.structure.bodies[body].nu
                 slots.fill("pending.tau", numbers[at : at + nu])
-            slots.fill("row.known", [lack])
-            slots.fill("coupling.still", [found["still"]])
-        yield one, lack
+            slots.fill("row.known", [error])
+            slots.fill("coupling.still", [values["still"]])
+        yield coupling, error

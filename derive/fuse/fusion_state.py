@@ -1,4 +1,4 @@
-"""What is known while the sweep of one scene is replayed: the graph, its inputs, its failures."""
+"""State while one scene is fused: graph, inputs and failures."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ Kernels = Callable[[Key, str], KernelIR]
 
 
 class FusionState:
-    """Graph, numbers and inputs of a scene that is being fused; `failures` are those of other
-    kernels of the same library, which go on here."""
+    """Graph, parameter values and inputs of a scene that is being fused.
+
+    `failures` may be a list shared with other kernels of the same library; new ones are
+    appended.
+    """
 
     def __init__(
         self,
@@ -37,7 +40,7 @@ class FusionState:
         self.memory = self.graph.vector("memory", structure.n_memory)
 
     def entries(self, entries: Entries) -> Nodes:
-        """Nodes of structural constants and of places in p."""
+        """Nodes of structural constants (float) and of parameters (index into p)."""
         return [self._entry(entry) for entry in entries]
 
     def _entry(self, entry: float | int) -> Node:
@@ -47,17 +50,17 @@ class FusionState:
             return self.graph.constant(self.numbers[entry])
         return self.graph.element("p", entry)
 
-    def expression(self, found: ExpressionStructure, **more: Sequence[Node]) -> Nodes:
-        """Values of expressions of the scene."""
-        given: dict[str, Sequence[Node]] = {
-            "t": [self.t], "q": self.q, "u": self.u, "constants": self.entries(found.constants),
+    def expression(self, source: ExpressionStructure, **extra: Sequence[Node]) -> Nodes:
+        """Values of the scene's expressions."""
+        available: dict[str, Sequence[Node]] = {
+            "t": [self.t], "q": self.q, "u": self.u, "constants": self.entries(source.constants),
         }  # fmt: skip
-        given |= more
-        inputs = {port.name: given[port.name] for port in found.kernel.inputs}
-        return next(iter(self.inline.run(found.kernel, inputs).values()))
+        available |= extra
+        inputs = {port.name: available[port.name] for port in source.kernel.inputs}
+        return next(iter(self.inline.run(source.kernel, inputs).values()))
 
     def fail_unless(self, condition: Node, reason: int, element: int, code: int) -> None:
-        """Guard of the fused kernel that stands for a failure of the looped engine."""
+        """Add the guard that reproduces a failure of the looped engine."""
         failure = (reason, element, code)
         if failure not in self.failures:
             self.failures.append(failure)

@@ -1,8 +1,8 @@
-"""A small scene as implicit methods see it: its residual, and the tangent of it factored.
+"""Residual of a small scene for implicit methods, and its factored tangent.
 
-Inverse dynamics is replayed on the nodes of one graph and differentiated there along every unknown.
-Few unknowns need no elimination by bodies: the tangent is a matrix in which what is zero folds
-away, and it is factored from tips to root, which fills nothing in.
+Inverse dynamics is evaluated on one graph and differentiated by every unknown. With few unknowns no
+elimination by bodies is needed: the tangent is a matrix whose zeros fold, and the factorisation
+from tips to root causes no fill-in.
 """
 
 from __future__ import annotations
@@ -23,50 +23,51 @@ from .scene_kernels import FAILED, FusedSceneIR, inputs_of
 from .schedule_interpreter import ScheduleInterpreter
 
 Matrix = list[Nodes]
-#: Speeds up to which K and M are kept apart.  A product by them is then some tenth of R
-#: differentiated along a direction, but the tangent takes ever more code: twice as much for 12
-#: speeds, which a compiler takes four times as long for.
-_MOST_WITH_SLOPES = 8
-#: Drives have no say in it: coordinates are what they are.
+#: Largest number of speeds for which K and M are stored separately. A product by them costs about a
+#: tenth of a directional derivative of R, but the code of the tangent grows: twice as much for 12
+#: speeds, with four times the compile time.
+_MAX_SPEEDS_STORED = 8
+#: Prescribed motion is not applied: coordinates are used as given.
 RATES = Sweep("rates", "Rates of the coordinates.", (Run(whole=PRESCRIBED), Run(whole=FORWARD)))
 
 
 def fuse_implicit(structure: Structure, kernels: Kernels) -> FusedSceneIR:
-    """What `mstmm_implicit` (runtime/integrate/c/implicit.h) asks of a scene, as kernels.
+    """Kernels that `mstmm_implicit` (runtime/integrate/c/implicit.h) needs of a scene.
 
-    All read p, t, q, u, memory and the accelerations a.  "residual": R (nu) by inverse dynamics,
-    zero where speeds are imposed; "residual_power": and the power of everything that is not
-    stored.  "residual_rate": its derivative in t.  "tangent": the factors (nu x nu, see
-    `factor_reverse_lu`) of K W + C + s M with a one for every imposed speed, where K, C and M are
-    the slopes of R in q, u and a, steps are s, sq and kappa, and W = (sq - kappa g_q)^-1 N where
-    q' = N u has the slopes g_q in q.  "tangent_slopes", of very small scenes: the factors, and K
-    and M (nu x (nq + nu)).  "rest": r - K dq - M da, of those slopes where there are any.
-    "solution": x (nu) of factors and r.  "coordinates": dq (nq) of x and rho (nq),
-    sq dq = kappa g_q dq + N x + rho.  "rates": q' alone.  Driven coordinates have neither.
+    All read p, t, q, u, memory and the accelerations a.  "residual": R (nu) by inverse
+    dynamics, zero for prescribed speeds; "residual_power": R and the power of everything that
+    is not stored. "residual_rate": the derivative of R in t.  "tangent": the factors (nu x nu,
+    see `factor_reverse_lu`) of K W + C + s M with a one for every prescribed speed, where K, C
+    and M are the derivatives of R in q, u and a, steps are s, sq and kappa, and W = (sq - kappa
+    g_q)^-1 N where q' = N u has the derivative g_q in q.  "tangent_slopes", of very small
+    scenes: the factors, and K and M (nu x (nq + nu)).  "rest": r - K dq - M da, of those
+    derivatives where they exist. "solution": x (nu) of factors and r.  "coordinates": dq (nq)
+    of x and rho (nq), sq dq = kappa g_q dq + N x + rho.  "rates": q' alone.  Prescribed
+    coordinates have neither.
 
-    A guard that fails says no more than that the looped engine must be asked.
+    A failing guard does not name its cause: evaluate the looped engine for the message.
     """
-    with_slopes = structure.nu <= _MOST_WITH_SLOPES
-    found = _Residual(structure, kernels).kernels(rest=not with_slopes)
-    if with_slopes:
-        found += _Residual(structure, kernels).by_slopes()
-    found += [_solution(structure.nu), *_Moving(structure, kernels).kernels()]
-    return FusedSceneIR(BalancedKernels(*found), ((0, -1, FAILED),))
+    stores_derivatives = structure.nu <= _MAX_SPEEDS_STORED
+    kernel_list = _ResidualKernels(structure, kernels).kernels(rest=not stores_derivatives)
+    if stores_derivatives:
+        kernel_list += _ResidualKernels(structure, kernels).by_slopes()
+    kernel_list += [_solution_kernel(structure.nu), *_RateKernels(structure, kernels).kernels()]
+    return FusedSceneIR(BalancedKernels(*kernel_list), ((0, -1, FAILED),))
 
 
 def _inputs(structure: Structure) -> list[Port]:
     return [*inputs_of(structure)[:-1], Port("a", (structure.nu,))]
 
 
-def _imposed(structure: Structure) -> list[bool]:
-    found = [False] * structure.nu
+def _is_prescribed(structure: Structure) -> list[bool]:
+    mask = [False] * structure.nu
     for body in structure.bodies:
         for k, imposed in enumerate(body.imposed):
-            found[body.u + k] = bool(imposed)
-    return found
+            mask[body.u + k] = bool(imposed)
+    return mask
 
 
-def _factors(nu: int) -> Port:
+def _factors_port(nu: int) -> Port:
     return Port("factors", (nu, nu))
 
 
@@ -74,148 +75,164 @@ def _slopes_port(structure: Structure) -> Port:
     return Port("slopes", (structure.nu, structure.nq + structure.nu))
 
 
-def _known(structure: Structure) -> list[Port]:
-    """What is known of an equation: its right-hand side, and parts of the increments."""
+def _known_ports(structure: Structure) -> list[Port]:
+    """Ports of the known terms of a linear equation: right-hand side and given increments."""
     nq, nu = structure.nq, structure.nu
     return [_slopes_port(structure), Port("r", (nu,)), Port("dq", (nq,)), Port("da", (nu,))]
 
 
-def _solution(nu: int) -> KernelIR:
+def _solution_kernel(nu: int) -> KernelIR:
     graph = Graph()
     factors = [[graph.element("factors", i, j) for j in range(nu)] for i in range(nu)]
     x = solve_reverse_lu(factors, graph.vector("r", nu))
     return graph.kernel(
-        "solution", [_factors(nu), Port("r", (nu,))], [Port("x", (nu,))], {"x": x}, as_made=True
+        "solution",
+        [_factors_port(nu), Port("r", (nu,))],
+        [Port("x", (nu,))],
+        {"x": x},
+        as_made=True,
     )
 
 
-def _driven(structure: Structure) -> set[int]:
-    """Coordinates that drives prescribe."""
-    found = set[int]()
+def _prescribed_coordinates(structure: Structure) -> set[int]:
+    """Indices of prescribed coordinates."""
+    indices = set[int]()
     for body in structure.bodies:
         if body.nu and all(body.imposed):
-            found |= set(range(body.q, body.q + body.nq))
-        else:  # rates are speeds where some of them alone are driven
-            found |= {body.q + k for k in range(body.nu) if body.imposed[k]}
-    return found
+            indices |= set(range(body.q, body.q + body.nq))
+        else:  # coordinate rates equal speeds where only some of them are prescribed
+            indices |= {body.q + k for k in range(body.nu) if body.imposed[k]}
+    return indices
 
 
-class _Lag:
-    """How coordinates follow speeds within a step, hinge by hinge: Q dq = N x + rho."""
+class _CoordinateIncrements:
+    """Coordinate increments that follow from speed increments, per hinge: Q dq = N x + rho."""
 
     def __init__(self, state: FusionState) -> None:
         self.graph, q, u = state.graph, state.q, state.u
-        self._driven = _driven(state.structure)
+        self._prescribed_coordinates = _prescribed_coordinates(state.structure)
         self.replay = replay = ScheduleInterpreter(state, staged=False)
         replay.sweep(RATES)
         s, sq, kappa = self.graph.vector("steps", 3)
         self.s, self._sq, self._kappa = s, sq, kappa
-        self._straight: dict[int, int] = {}
-        self._turning: list[tuple[int, int, Matrix, Matrix]] = []
+        self._speed_of_coordinate: dict[int, int] = {}
+        self._coupled_rates: list[tuple[int, int, Matrix, Matrix]] = []
         for index, body in enumerate(state.structure.bodies):
             if body.modal is not None:
-                self._straight |= {body.modal.q + k: body.modal.u + k for k in range(body.modal.n)}
+                self._speed_of_coordinate |= {
+                    body.modal.q + k: body.modal.u + k for k in range(body.modal.n)
+                }
             rates = replay.filled(index, "body.qdot") or []
             first, speeds = q[body.q : body.q + body.nq], u[body.u : body.u + body.nu]
-            slopes = [derivatives(rates, {one: 1}) for one in first]
-            turned = [derivatives(rates, {one: 1}) for one in speeds]
+            slopes = [derivatives(rates, {variable: 1}) for variable in first]
+            by_speeds = [derivatives(rates, {variable: 1}) for variable in speeds]
             if body.nq == body.nu and not any(x.value != 0 for row in slopes for x in row):
-                self._straight |= {body.q + k: body.u + k for k in range(body.nu)}
+                self._speed_of_coordinate |= {body.q + k: body.u + k for k in range(body.nu)}
             elif body.nq:
-                self._turning.append((body.q, body.u, _transposed(slopes), _transposed(turned)))
+                self._coupled_rates.append(
+                    (body.q, body.u, _transpose(slopes), _transpose(by_speeds))
+                )
 
     def changes(self, x: Nodes, rho: Nodes | None) -> dict[int, Node]:
-        """dq by coordinate; coordinates that do not change are left out."""
-        found = {}
-        for place, speed in self._straight.items():
-            change = x[speed] if rho is None else x[speed] + rho[place]
+        """dq by coordinate index; coordinates that do not change are omitted."""
+        increments = {}
+        for index, speed in self._speed_of_coordinate.items():
+            change = x[speed] if rho is None else x[speed] + rho[index]
             if change.value != 0:
-                found[place] = change / self._sq
-        for first, speed, slopes, turned in self._turning:
-            n, own = len(slopes), x[speed : speed + len(turned[0])]
-            right = [_product(self.graph, row, dict(enumerate(own))) for row in turned]
+                increments[index] = change / self._sq
+        for first, speed, slopes, by_speeds in self._coupled_rates:
+            n, rates = len(slopes), x[speed : speed + len(by_speeds[0])]
+            right = [_product(self.graph, row, dict(enumerate(rates))) for row in by_speeds]
             if rho is not None:
                 right = [a + b for a, b in zip(right, rho[first : first + n], strict=True)]
             if any(entry.value != 0 for entry in right):
-                found |= dict(enumerate(self._answered(slopes, right), first))
-        return {place: change for place, change in found.items() if place not in self._driven}
+                increments |= dict(enumerate(self._solve_hinge(slopes, right), first))
+        return {
+            index: change
+            for index, change in increments.items()
+            if index not in self._prescribed_coordinates
+        }
 
-    def _answered(self, slopes: Matrix, right: Nodes) -> Nodes:
-        """dq of one hinge: (sq - kappa g_q) dq = right."""
+    def _solve_hinge(self, slopes: Matrix, right: Nodes) -> Nodes:
+        """dq of one hinge: solution of (sq - kappa g_q) dq = right."""
         matrix = [[-self._kappa * entry for entry in row] for row in slopes]
         for i in range(len(matrix)):
             matrix[i][i] = matrix[i][i] + self._sq
         return [row[0] for row in solve_pivoted(self.graph, matrix, [[x] for x in right])]
 
 
-def _transposed(rows: Matrix) -> Matrix:
+def _transpose(rows: Matrix) -> Matrix:
     return [list(column) for column in zip(*rows, strict=True)]
 
 
 def _product(graph: Graph, row: Nodes, column: dict[int, Node]) -> Node:
-    """Of a row and a column, whose entries that are not there are zero."""
+    """Scalar product of a row and a sparse column (missing entries are zero)."""
     total = graph.constant(0)
-    for place, entry in column.items():
-        total = total + row[place] * entry
+    for index, entry in column.items():
+        total = total + row[index] * entry
     return total
 
 
-class _Moving:
-    """The kernels that ask for the rates of the coordinates alone."""
+class _RateKernels:
+    """Kernels that need only the coordinate rates."""
 
     def __init__(self, structure: Structure, kernels: Kernels) -> None:
         self._structure = structure
         state = FusionState(structure, kernels, None)
-        self._graph, self._lag = state.graph, _Lag(state)
-        self._rates = self._lag.replay.gathered("qdot")
-        for place in _driven(structure):
-            self._rates[place] = state.zero
+        self._graph, self._increments = state.graph, _CoordinateIncrements(state)
+        self._rates = self._increments.replay.gathered("qdot")
+        for index in _prescribed_coordinates(structure):
+            self._rates[index] = state.zero
 
     def kernels(self) -> list[KernelIR]:
-        return [self._rate(), self._coordinates()]
+        return [self._rate_kernel(), self._coordinates_kernel()]
 
-    def _rate(self) -> KernelIR:
+    def _rate_kernel(self) -> KernelIR:
         s = self._structure
         return self._graph.kernel(
             "rates", _inputs(s), [Port("dq", (s.nq,))], {"dq": self._rates}, as_made=True
         )
 
-    def _coordinates(self) -> KernelIR:
+    def _coordinates_kernel(self) -> KernelIR:
         graph, s = self._graph, self._structure
-        changes = self._lag.changes(graph.vector("x", s.nu), graph.vector("rho", s.nq))
-        more = [Port("steps", (3,)), Port("x", (s.nu,)), Port("rho", (s.nq,))]
-        dq = [changes.get(place, graph.constant(0)) for place in range(s.nq)]
+        changes = self._increments.changes(graph.vector("x", s.nu), graph.vector("rho", s.nq))
+        increment_ports = [Port("steps", (3,)), Port("x", (s.nu,)), Port("rho", (s.nq,))]
+        dq = [changes.get(index, graph.constant(0)) for index in range(s.nq)]
         return graph.kernel(
-            "coordinates", [*_inputs(s), *more], [Port("dq", (s.nq,))], {"dq": dq}, as_made=True
+            "coordinates",
+            [*_inputs(s), *increment_ports],
+            [Port("dq", (s.nq,))],
+            {"dq": dq},
+            as_made=True,
         )
 
 
-class _Residual:
-    """The kernels that are made of inverse dynamics."""
+class _ResidualKernels:
+    """Kernels based on inverse dynamics."""
 
     def __init__(self, structure: Structure, kernels: Kernels) -> None:
-        self._structure, self._imposed = structure, _imposed(structure)
+        self._structure, self._is_prescribed = structure, _is_prescribed(structure)
         state = FusionState(structure, kernels, None)
         state.efforts = state.zeros(structure.nu)
         self._graph, self._t, self._q, self._u = state.graph, state.t, list(state.q), list(state.u)
-        self._a, self._lag = state.given, _Lag(state)
+        self._a, self._increments = state.given, _CoordinateIncrements(state)
         replay = ScheduleInterpreter(state, staged=False, inverse=True)
         replay.sweep(INVERSE_DYNAMICS)
         required = replay.gathered("required")
-        driven = zip(required, state.u, self._imposed, strict=True)
+        terms = zip(required, state.u, self._is_prescribed, strict=True)
         self._power = sum(
-            (felt * speed for felt, speed, imposed in driven if imposed),
+            (load * speed for load, speed, imposed in terms if imposed),
             replay.get("sums.power", 1)[0],
         )
         self._r = [
-            state.zero if imposed else one
-            for one, imposed in zip(required, self._imposed, strict=True)
+            state.zero if imposed else effort
+            for effort, imposed in zip(required, self._is_prescribed, strict=True)
         ]
         for condition in replay.conditions:
             state.graph.guard(condition, FAILED, "the looped engine names what fails")
 
     def kernels(self, rest: bool = False) -> list[KernelIR]:
-        """All but those of the slopes; the tangent last, whose pivots are guards of the graph."""
+        """Kernels without stored derivatives; the tangent is last because it adds guards."""
         s, ports = self._structure, _inputs(self._structure)
         graph, r, power = self._graph, Port("r", (s.nu,)), Port("power", (1,))
         values: dict[str, object] = {"r": self._r, "power": [self._power]}
@@ -224,76 +241,89 @@ class _Residual:
             graph.kernel("residual", ports, [r], {"r": self._r}, as_made=True),
             graph.kernel("residual_power", ports, [r, power], values, as_made=True),
             graph.kernel("residual_rate", ports, [Port("r_t", (s.nu,))], rate, as_made=True),
-            *([self._rest(ports)] if rest else []),
-            self._tangent(ports),
+            *([self._rest_kernel(ports)] if rest else []),
+            self._tangent_kernel(ports),
         ]
 
-    def _tangent(self, ports: list[Port]) -> KernelIR:
+    def _tangent_kernel(self, ports: list[Port]) -> KernelIR:
         graph, s = self._graph, self._structure
-        matrix = _transposed([self._along(j) for j in range(s.nu)])
+        matrix = _transpose([self._tangent_column(j) for j in range(s.nu)])
         return graph.kernel(
-            "tangent", [*ports, Port("steps", (3,))], [_factors(s.nu)],
+            "tangent", [*ports, Port("steps", (3,))], [_factors_port(s.nu)],
             {"factors": factor_reverse_lu(graph, matrix)}, as_made=True,
         )  # fmt: skip
 
-    def _along(self, j: int) -> Nodes:
+    def _tangent_column(self, j: int) -> Nodes:
         """Column j of the tangent."""
         graph = self._graph
         unit = [graph.constant(int(i == j)) for i in range(self._structure.nu)]
-        if self._imposed[j]:
+        if self._is_prescribed[j]:
             return unit
-        seeds: dict[Node, Node | float] = {self._u[j]: 1, self._a[j]: self._lag.s}
-        for place, change in self._lag.changes(unit, None).items():
-            seeds[self._q[place]] = change
+        seeds: dict[Node, Node | float] = {self._u[j]: 1, self._a[j]: self._increments.s}
+        for index, change in self._increments.changes(unit, None).items():
+            seeds[self._q[index]] = change
         return derivatives(self._r, seeds)
 
-    def _rest(self, ports: list[Port]) -> KernelIR:
-        """R differentiated along the increments that are known."""
+    def _rest_kernel(self, ports: list[Port]) -> KernelIR:
+        """Directional derivative of R along the known increments."""
         graph, s = self._graph, self._structure
-        moved = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
-        slope = derivatives(self._r, dict(zip([*self._q, *self._a], moved, strict=True)))
-        rest = [a - b for a, b in zip(graph.vector("r", s.nu), slope, strict=True)]
+        increments = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
+        derivative = derivatives(self._r, dict(zip([*self._q, *self._a], increments, strict=True)))
+        remainder = [a - b for a, b in zip(graph.vector("r", s.nu), derivative, strict=True)]
         return graph.kernel(
-            "rest", [*ports, *_known(s)], [Port("rest", (s.nu,))], {"rest": rest}, as_made=True
+            "rest",
+            [*ports, *_known_ports(s)],
+            [Port("rest", (s.nu,))],
+            {"rest": remainder},
+            as_made=True,
         )
 
     def by_slopes(self) -> list[KernelIR]:
-        """The same where K and M are kept, and the tangent that is made of them."""
+        """Kernels that store K and M, and the tangent formed from them."""
         graph, s, ports = self._graph, self._structure, _inputs(self._structure)
-        known, speeds = self._slopes([*self._q, *self._a]), self._slopes(self._u)
-        matrix = _transposed([self._sum(j, known, speeds) for j in range(s.nu)])
-        slopes = [_slopes_port(s), _factors(s.nu)]
-        values: dict[str, object] = {"slopes": known, "factors": factor_reverse_lu(graph, matrix)}
-        both = graph.kernel(
-            "tangent_slopes", [*ports, Port("steps", (3,))], slopes, values, as_made=True
+        stored, by_speeds = (
+            self._derivative_rows([*self._q, *self._a]),
+            self._derivative_rows(self._u),
         )
-        return [both, self._product_kernel(ports, known)]
+        matrix = _transpose(
+            [self._stored_tangent_column(j, stored, by_speeds) for j in range(s.nu)]
+        )
+        ports_out = [_slopes_port(s), _factors_port(s.nu)]
+        values: dict[str, object] = {"slopes": stored, "factors": factor_reverse_lu(graph, matrix)}
+        tangent = graph.kernel(
+            "tangent_slopes", [*ports, Port("steps", (3,))], ports_out, values, as_made=True
+        )
+        return [tangent, self._stored_rest_kernel(ports, stored)]
 
-    def _slopes(self, leaves: Nodes) -> Matrix:
-        """Of R, a row for each of its entries."""
-        return _transposed([derivatives(self._r, {leaf: 1}) for leaf in leaves])
+    def _derivative_rows(self, leaves: Nodes) -> Matrix:
+        """Derivatives of R, one row for each entry."""
+        return _transpose([derivatives(self._r, {leaf: 1}) for leaf in leaves])
 
-    def _sum(self, j: int, known: Matrix, speeds: Matrix) -> Nodes:
+    def _stored_tangent_column(self, j: int, stored: Matrix, by_speeds: Matrix) -> Nodes:
         """Column j of K W + C + s M."""
         graph, s = self._graph, self._structure
         unit = [graph.constant(int(i == j)) for i in range(s.nu)]
-        if self._imposed[j]:
+        if self._is_prescribed[j]:
             return unit
-        changes = {s.nq + j: self._lag.s, **self._lag.changes(unit, None)}
+        changes = {s.nq + j: self._increments.s, **self._increments.changes(unit, None)}
         return [
             by_speed[j] + _product(graph, row, changes)
-            for row, by_speed in zip(known, speeds, strict=True)
+            for row, by_speed in zip(stored, by_speeds, strict=True)
         ]
 
-    def _product_kernel(self, ports: list[Port], known: Matrix) -> KernelIR:
-        """Where K and M are zero whatever the numbers, nothing is read."""
+    def _stored_rest_kernel(self, ports: list[Port], stored: Matrix) -> KernelIR:
+        """Kernel "rest" from stored K and M; structural zeros are not read."""
         s, graph = self._structure, Graph()
-        moved = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
-        rest = []
-        for i, row in enumerate(known):
-            there = {k: moved[k] for k, slope in enumerate(row) if slope.value != 0}
+        increments = [*graph.vector("dq", s.nq), *graph.vector("da", s.nu)]
+        remainder = []
+        for i, row in enumerate(stored):
+            nonzero = {k: increments[k] for k, slope in enumerate(row) if slope.value != 0}
             slopes = [graph.element("slopes", i, k) for k in range(len(row))]
-            rest.append(graph.element("r", i) - _product(graph, slopes, there))
+            remainder.append(graph.element("r", i) - _product(graph, slopes, nonzero))
         return graph.kernel(
-            "rest", [*ports, *_known(s)], [Port("rest", (s.nu,))], {"rest": rest}, as_made=True
+            "rest",
+            [*ports, *_known_ports(s)],
+            [Port("rest", (s.nu,))],
+            {"rest": remainder},
+            as_made=True,
         )

@@ -1,4 +1,4 @@
-"""Inverse dynamics and mass matrix of a tree that nothing drives, as straight-line KernelIRs."""
+"""Inverse dynamics and mass matrix of a tree without prescribed motion."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from .schedule_interpreter import ScheduleInterpreter
 
 
 def fuse_inverse(structure: Structure, kernels: Kernels) -> FusedSceneIR:
-    """Kernels "required" and, of rigid bodies, "mass".  The scene has no drives.
+    """Kernels "required" and, for rigid bodies, "mass" of a scene without prescribed motion.
 
-    "required": the efforts (nu) beyond the laws' own that give the accelerations a; of p, t, q, u,
-    memory and a.  "mass": the mass matrix (nu x nu), of the same, of which p and q are read.  A
-    guard that fails says no more than that the looped engine must be asked.
+    "required": the efforts (nu) beyond those of the laws that give the accelerations a; of p,
+    t, q, u, memory and a.  "mass": the mass matrix (nu x nu); same inputs, of which p and q are
+    read.  A failing guard does not name its cause: evaluate the looped engine for the message.
     """
     state = FusionState(structure, kernels, None)
     state.efforts = state.zeros(structure.nu)
@@ -32,18 +32,17 @@ def fuse_inverse(structure: Structure, kernels: Kernels) -> FusedSceneIR:
     inputs = [*inputs_of(structure)[:-1], Port("a", (structure.nu,))]
     outputs = [Port("required", (structure.nu,))]
     values: dict[str, object] = {"required": replay.gathered("required")}
-    made = [state.graph.kernel("required", inputs, outputs, values, as_made=True)]
+    kernel_list = [state.graph.kernel("required", inputs, outputs, values, as_made=True)]
     if not any(body.modal for body in structure.bodies):
         state = FusionState(structure, kernels, None)
         square = [Port("M", (structure.nu, structure.nu))]
         matrix: dict[str, object] = {"M": _Composition(state).matrix()}
-        made.append(state.graph.kernel("mass", inputs, square, matrix, as_made=True))
-    return FusedSceneIR(BalancedKernels(*made), ((0, -1, FAILED),))
+        kernel_list.append(state.graph.kernel("mass", inputs, square, matrix, as_made=True))
+    return FusedSceneIR(BalancedKernels(*kernel_list), ((0, -1, FAILED),))
 
 
 class _Composition:
-    """The composed inertias of a scene; then a speed at a time, as mass_matrix.c of the engine
-    goes."""
+    """Composite inertias of a scene; mass matrix speed by speed as in mass_matrix.c."""
 
     def __init__(self, state: FusionState) -> None:
         self._structure, self._zeros = state.structure, state.zeros
@@ -53,35 +52,35 @@ class _Composition:
 
     def matrix(self) -> list[Nodes]:
         """Rows of the mass matrix."""
-        found = [self._zeros(self._structure.nu) for _ in range(self._structure.nu)]
+        rows = [self._zeros(self._structure.nu) for _ in range(self._structure.nu)]
         for index, body in enumerate(self._structure.bodies):
             for k in range(body.nu):
-                for other, load in self._felt(index, k):
-                    found[other][body.u + k] = found[body.u + k][other] = load
-        return found
+                for column, load in self._loads_to_root(index, k):
+                    rows[column][body.u + k] = rows[body.u + k][column] = load
+        return rows
 
-    def _felt(self, index: int, speed: int) -> list[tuple[int, Node]]:
-        """(speed, load on it) from a hinge to the root, where one speed changes at 1 a second."""
-        bodies, way = self._structure.bodies, [index]
-        while bodies[way[-1]].parent >= 0:
-            way.append(bodies[way[-1]].parent)
-        for place in way:
-            self._enter(place)
+    def _loads_to_root(self, index: int, speed: int) -> list[tuple[int, Node]]:
+        """(speed, load on it) from a hinge to the root for unit acceleration of one speed."""
+        bodies, path = self._structure.bodies, [index]
+        while bodies[path[-1]].parent >= 0:
+            path.append(bodies[path[-1]].parent)
+        for i in path:
+            self._enter(i)
             self._replay.fill("body.e", self._zeros(6))
-            self._replay.fill("body.given", self._zeros(bodies[place].nu))
+            self._replay.fill("body.given", self._zeros(bodies[i].nu))
         self._enter(index)
         self._replay.fill(f"body.given[{speed}]", [self._one])
-        self._at(EXERTED, index)
-        found = []
-        for place in way:
-            self._at(FELT_BY, place)
-            loads = self._replay.get("body.required", bodies[place].nu)
-            found += [(bodies[place].u + k, load) for k, load in enumerate(loads)]
-        return found
+        self._run_at(EXERTED, index)
+        pairs = []
+        for i in path:
+            self._run_at(FELT_BY, i)
+            loads = self._replay.get("body.required", bodies[i].nu)
+            pairs += [(bodies[i].u + k, load) for k, load in enumerate(loads)]
+        return pairs
 
     def _enter(self, index: int) -> None:
         self._replay.enter(self._replay.body_subject(index))
 
-    def _at(self, whole: Pass, index: int) -> None:
+    def _run_at(self, body_pass: Pass, index: int) -> None:
         self._enter(index)
-        self._replay.steps(whole.steps)
+        self._replay.steps(body_pass.steps)

@@ -1,7 +1,7 @@
-"""The linear equations of a small scene about any state, as one kernel.
+"""Linear equations of a small scene about any state, as one kernel.
 
-Inverse dynamics is replayed on the nodes of one graph and differentiated there, as the looped
-engine does it by a pass: along accelerations, speeds, and tangent increments of the coordinates.
+Inverse dynamics is evaluated on one graph and differentiated there, as in the pass of the looped
+engine: by accelerations, speeds, and tangent increments of the coordinates.
 """
 
 from __future__ import annotations
@@ -28,53 +28,58 @@ def fuse_linear(
 ) -> KernelIR:
     """Kernel "linear": M, C and K (n x n) of the speeds `free`, and N (nq x n) of q' = N u.
 
-    M = R_a, C = R_u and K = R_q N of the efforts R by inverse dynamics; P (n x numbers) is R_p of
-    some places in p.  Inputs p, t, q, u, memory and the accelerations a.
+    M = R_a, C = R_u and K = R_q N of the efforts R by inverse dynamics; P (n x numbers) is R_p
+    of the parameters with these indices in p.  Inputs p, t, q, u, memory and the accelerations
+    a.
     """
-    about, n = _About(structure, kernels, free), len(free)
-    values = about.slopes()
-    values["N"] = _matrix(about.moves)
-    values["P"] = [about.along("p", place, one) for one in about.r for place in numbers]
+    scene, n = _StateDerivatives(structure, kernels, free), len(free)
+    values = scene.slopes()
+    values["N"] = _rows_of_columns(scene.moves)
+    values["P"] = [scene.along("p", index, effort) for effort in scene.r for index in numbers]
     outputs = [
         *(Port(name, (n, n)) for name in "MCK"), Port("N", (structure.nq, n)),
         Port("P", (n * len(numbers),)),
     ]  # fmt: skip
-    return about.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
+    return scene.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
 
 
 def fuse_slopes(structure: Structure, kernels: Kernels) -> FusedSceneIR:
-    """Kernel "linear" of a library, and "accelerations" beside it.
+    """Kernel "linear" of a library, together with "accelerations".
 
-    M, C and K are as above, of the speeds that nobody imposes; G (n x n) is of x' = G x + du, and
-    r_t (n) of R by time at accelerations that stay.  A guard that fails says no more than that the
-    looped engine must be asked.
+    M, C and K as in `fuse_linear`, of the speeds that are not prescribed; G (n x n) is of x' =
+    G x + du, and r_t (n) the time derivative of R at constant accelerations.  A failing guard
+    does not name its cause: evaluate the looped engine for the message.
     """
-    free = [body.u + k for body in structure.bodies for k, held in enumerate(body.imposed)
-            if not held]  # fmt: skip
+    free = [
+        body.u + k
+        for body in structure.bodies
+        for k, is_prescribed in enumerate(body.imposed)
+        if not is_prescribed
+    ]
     free += [body.modal.u + k for body in structure.bodies if body.modal is not None
              for k in range(body.modal.n)]  # fmt: skip
-    about, n = _About(structure, kernels, sorted(free)), len(free)
-    for condition in about.conditions:
-        about.graph.guard(condition, FAILED, "the looped engine names what fails")
-    values = about.slopes()
-    values["G"] = about.turning()
-    values["r_t"] = [about.along("t", 0, one) for one in about.r]
+    scene, n = _StateDerivatives(structure, kernels, sorted(free)), len(free)
+    for condition in scene.conditions:
+        scene.graph.guard(condition, FAILED, "the looped engine names what fails")
+    values = scene.slopes()
+    values["G"] = scene.turning()
+    values["r_t"] = [scene.along("t", 0, effort) for effort in scene.r]
     outputs = [*(Port(name, (n, n)) for name in "MCKG"), Port("r_t", (n,))]
-    kernel = about.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
-    both = {"accelerations": fuse(structure, kernels).kernels["accelerations"]}
-    return FusedSceneIR(both | {kernel.name: balance(kernel)}, ((0, -1, FAILED),))
+    kernel = scene.graph.kernel("linear", _inputs(structure), outputs, values, as_made=True)
+    kernel_map = {"accelerations": fuse(structure, kernels).kernels["accelerations"]}
+    return FusedSceneIR(kernel_map | {kernel.name: balance(kernel)}, ((0, -1, FAILED),))
 
 
 def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:
-    """Kernel "required": the efforts R (nu) by inverse dynamics, of the same inputs."""
+    """Kernel "required": efforts R (nu) by inverse dynamics; inputs as in `fuse_linear`."""
     state = FusionState(structure, kernels, None)
     outputs = [Port("required", (structure.nu,))]
-    values: dict[str, object] = {"required": _required(state).gathered("required")}
+    values: dict[str, object] = {"required": _inverse_dynamics(state).gathered("required")}
     return state.graph.kernel("required", _inputs(structure), outputs, values, as_made=True)
 
 
-class _About:
-    """One scene about any state: efforts `r` in the speeds `free`, and how q follows each."""
+class _StateDerivatives:
+    """One scene about any state: efforts R, and the coordinate change along each free speed."""
 
     def __init__(self, structure: Structure, kernels: Kernels, free: Sequence[int]) -> None:
         state = FusionState(structure, kernels, None)
@@ -84,53 +89,55 @@ class _About:
         rates.sweep(RATES)
         self._rates = rates.gathered("qdot")
         self.moves = [derivatives(self._rates, {self._u[j]: 1}) for j in free]
-        replay = _required(state)
+        replay = _inverse_dynamics(state)
         self.conditions = replay.conditions
         required = replay.gathered("required")
         self.r = [required[j] for j in free]
 
-    def along(self, port: str, place: int, one: Node) -> Node:
-        """A node by an entry of an input."""
-        return derivative(one, {self.graph.element(port, place): 1})
+    def along(self, port: str, index: int, node: Node) -> Node:
+        """Seed of a derivative: the node of one input entry with the value `one`."""
+        return derivative(node, {self.graph.element(port, index): 1})
 
     def slopes(self) -> dict[str, object]:
-        """M, C and K; of M, which is symmetric, one half is differentiated."""
+        """M, C and K; only one half of the symmetric M is differentiated."""
         half = [derivatives(self.r[k:], {self._a[j]: 1}) for k, j in enumerate(self._free)]
         n = range(len(half))
         return {
             "M": [[half[min(i, j)][abs(i - j)] for j in n] for i in n],
-            "C": _matrix([derivatives(self.r, {self._u[j]: 1}) for j in self._free]),
-            "K": _matrix([derivatives(self.r, self._moved(move)) for move in self.moves]),
+            "C": _rows_of_columns([derivatives(self.r, {self._u[j]: 1}) for j in self._free]),
+            "K": _rows_of_columns(
+                [derivatives(self.r, self._coordinate_seeds(move)) for move in self.moves]
+            ),
         }
 
     def turning(self) -> list[Nodes]:
-        """G: where q goes by q(t) + N x, N x' = (q'_q N - N') x + N du, hinge by hinge."""
-        n, place = len(self._free), {j: k for k, j in enumerate(self._free)}
-        found = [[self.graph.constant(0)] * n for _ in range(n)]
+        """G by hinge: for q(t) + N x, N x' = (q'_q N - N') x + N du."""
+        n, position = len(self._free), {j: k for k, j in enumerate(self._free)}
+        rows = [[self.graph.constant(0)] * n for _ in range(n)]
         for body in self._structure.bodies:
-            own = [place[j] for j in range(body.u, body.u + body.nu) if j in place]
-            moves = [self.moves[k][body.q : body.q + body.nq] for k in own]
-            bent = [self._bend(self.moves[k])[body.q : body.q + body.nq] for k in own]
-            if not any(x.value != 0 for column in bent for x in column):
+            columns = [position[j] for j in range(body.u, body.u + body.nu) if j in position]
+            moves = [self.moves[k][body.q : body.q + body.nq] for k in columns]
+            rates = [self._subspace_rate(self.moves[k])[body.q : body.q + body.nq] for k in columns]
+            if not any(x.value != 0 for column in rates for x in column):
                 continue
-            square = [[_dot(one, other) for other in moves] for one in moves]
-            right = [[_dot(one, column) for column in bent] for one in moves]
-            for i, row in zip(own, solve_symmetric(self.graph, square, right), strict=True):
-                for j, entry in zip(own, row, strict=True):
-                    found[i][j] = entry
-        return found
+            square = [[_dot_product(a, b) for b in moves] for a in moves]
+            right = [[_dot_product(a, column) for column in rates] for a in moves]
+            for i, row in zip(columns, solve_symmetric(self.graph, square, right), strict=True):
+                for j, entry in zip(columns, row, strict=True):
+                    rows[i][j] = entry
+        return rows
 
-    def _bend(self, move: Nodes) -> Nodes:
+    def _subspace_rate(self, move: Nodes) -> Nodes:
         """q'_q n - n' of a column n of N."""
-        along, carried = self._moved(move), self._moved(self._rates)
-        pairs = zip(derivatives(self._rates, along), derivatives(move, carried), strict=True)
-        return [one - other for one, other in pairs]
+        seeds, rate_seeds = self._coordinate_seeds(move), self._coordinate_seeds(self._rates)
+        pairs = zip(derivatives(self._rates, seeds), derivatives(move, rate_seeds), strict=True)
+        return [a - b for a, b in pairs]
 
-    def _moved(self, rates: Nodes) -> dict[Node, Node | float]:
+    def _coordinate_seeds(self, rates: Nodes) -> dict[Node, Node | float]:
         return dict(zip(self._q, rates, strict=True))
 
 
-def _required(state: FusionState) -> ScheduleInterpreter:
+def _inverse_dynamics(state: FusionState) -> ScheduleInterpreter:
     state.efforts = state.zeros(state.structure.nu)
     replay = ScheduleInterpreter(state, staged=False, inverse=True)
     replay.sweep(INVERSE_DYNAMICS)
@@ -141,13 +148,13 @@ def _inputs(structure: Structure) -> list[Port]:
     return [*inputs_of(structure)[:-1], Port("a", (structure.nu,))]
 
 
-def _dot(one: Nodes, other: Nodes) -> Node:
-    total = one[0] * other[0]
-    for a, b in zip(one[1:], other[1:], strict=True):
+def _dot_product(u: Nodes, v: Nodes) -> Node:
+    total = u[0] * v[0]
+    for a, b in zip(u[1:], v[1:], strict=True):
         total = total + a * b
     return total
 
 
-def _matrix(columns: list[Nodes]) -> list[Nodes]:
-    """The matrix of these columns, row by row."""
+def _rows_of_columns(columns: list[Nodes]) -> list[Nodes]:
+    """Rows of the matrix with these columns."""
     return [list(row) for row in zip(*columns, strict=True)]

@@ -1,8 +1,7 @@
 """Fused engine: the whole sweep of one scene as straight-line KernelIRs, by value numbering.
 
-The schedule is replayed on the nodes of one graph: axes that are aligned, loads that are zero and
-motions that stay in a plane fold away as they arise, and what no acceleration needs is never
-emitted.  No SymPy.
+The schedule is evaluated on one graph. Aligned axes, zero loads and planar motion fold at once, and
+nodes that no acceleration needs are not emitted.  No SymPy.
 """
 
 from __future__ import annotations
@@ -19,19 +18,19 @@ from .loop_assembly import gaps, slips
 from .optimisation.sum_balancing import BalancedKernels, balance
 from .schedule_interpreter import ScheduleInterpreter
 
-#: The one guard code of kernels whose failures the looped engine names.
+#: Guard code of kernels that leave the failure message to the looped engine.
 FAILED = 1
 
-#: Power and potential that add at most this part to the operations of accelerations are had with
-#: them: one text for both takes half the time to compile.
-_CHEAP = 0.03
+#: Power and potential are computed together with accelerations if they add at most this share of
+#: operations: one function for both halves the compile time.
+_MAX_EXTRA_SHARE = 0.03
 
 
 @dataclass(frozen=True)
 class FusedSceneIR:
-    """Kernels of one scene.  Guard code 1 + k stands for failures[k] = (reason, element, code).
+    """Kernels of one scene.  Guard code 1 + k means failures[k] = (reason, element, code).
 
-    Where `power_is_cheap`, "accelerations" need no code of their own beside "accelerations_power".
+    If `power_is_cheap`, "accelerations_power" also serves as "accelerations".
     """
 
     kernels: Mapping[str, KernelIR]
@@ -51,17 +50,17 @@ def inputs_of(structure: Structure) -> list[Port]:
 def fuse(
     structure: Structure, kernels: Kernels, numbers: Sequence[float] | None = None
 ) -> FusedSceneIR:
-    """Kernel "accelerations" of a scene, and "accelerations_power" where there are laws or loads;
-    where loops are closed "gaps" and "slips" besides (see `closing`).
+    """Kernels "accelerations" and, with laws or loads, "accelerations_power" of a scene.
 
-    Inputs p, t, q, u, memory, efforts; outputs qdot, udot, and with power the power of everything
-    that is not stored and the potential of springs and laws.  With `numbers` the parameters are
-    baked in as constants and p is not read.
+    Closed loops add "gaps" and "slips" (see `loop_assembly`).  Inputs p, t, q, u, memory,
+    efforts; outputs qdot, udot, and with power the power of everything that is not stored and
+    the potential of springs and laws.  With `numbers` the parameters are compiled in as
+    constants and p is not read.
     """
     state, s = FusionState(structure, kernels, numbers), structure
     replay = ScheduleInterpreter(state)
     replay.sweep(ACCELERATIONS)
-    for _ in range(s.refines):  # pivots are those of before: one node each
+    for _ in range(s.refines):  # same pivots as in the first solution: their nodes are shared
         state.given = replay.gathered("udot")
         replay = ScheduleInterpreter(state, refined=True)
         replay.sweep(ACCELERATIONS)
@@ -71,25 +70,27 @@ def fuse(
         "qdot": replay.gathered("qdot"), "udot": replay.gathered("udot"),
     }  # fmt: skip
     power: dict[str, object] = {port.name: replay.get(f"sums.{port.name}", 1) for port in sums}
-    found = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
-    cheap = False
+    kernel_list = [state.graph.kernel("accelerations", inputs_of(s), outputs, values, as_made=True)]
+    is_cheap = False
     flexible = any(body.modal is not None for body in s.bodies)
     if s.laws or s.driven or s.loads or s.forces or s.couplings or flexible:
-        found.append(
+        kernel_list.append(
             state.graph.kernel(
                 "accelerations_power", inputs_of(s), [*outputs, *sums], values | power,
                 as_made=True,
             )
         )  # fmt: skip
-        alone, both = (kernel.flops() for kernel in found)
-        cheap = both <= (1 + _CHEAP) * alone
-    for close in (gaps, slips) if s.closes else ():
-        found.append(close(FusionState(s, kernels, numbers, state.failures), inputs_of(s)))
-    return FusedSceneIR(BalancedKernels(*found), tuple(state.failures), cheap)
+        alone, with_power = (kernel.flops() for kernel in kernel_list)
+        is_cheap = with_power <= (1 + _MAX_EXTRA_SHARE) * alone
+    for fuse_correction in (gaps, slips) if s.closes else ():
+        kernel_list.append(
+            fuse_correction(FusionState(s, kernels, numbers, state.failures), inputs_of(s))
+        )
+    return FusedSceneIR(BalancedKernels(*kernel_list), tuple(state.failures), is_cheap)
 
 
 def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:
-    """Kernel "solution": M^-1 times one column, and behind it 1 if every pivot moves inertia.
+    """Kernel "solution": M^-1 times one column, and 1 if every pivot moves inertia.
 
     Inputs as those of "accelerations", of which p, q and memory are read, and the column.
     """
@@ -101,11 +102,11 @@ def fuse_solution(structure: Structure, kernels: Kernels) -> KernelIR:
     holds = state.one
     for condition in replay.conditions:
         holds = state.graph.call("and", holds, condition)
-    answer = state.graph.kernel(
+    solution = state.graph.kernel(
         "solution",
         [*inputs_of(s), Port("column", (s.nu,))],
         [Port("answer", (s.nu + 1,))],
         {"answer": [*replay.gathered("answer"), holds]},
         as_made=True,
     )
-    return balance(answer)
+    return balance(solution)

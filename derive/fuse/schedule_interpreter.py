@@ -1,4 +1,4 @@
-"""The schedule replayed on the nodes of one graph: every call inlined, every zero folding."""
+"""Interpreter of the schedule on one graph: calls are inlined and zeros fold."""
 
 from __future__ import annotations
 
@@ -40,17 +40,20 @@ from .fusion_state import FusionState
 from .kernel_selection import along_a_screw, screw_axis, unit_row
 from .slot_values import GROUND, Subject
 
-#: Lengths of the local slots that start from zeros.
+#: Lengths of local slots that are initialised with zeros.
 _LOCAL_SIZES = {"local.e_I": 6, "local.S_I": 21, "local.effort": 1}
-#: A pivot must exceed this share of the mean inertia of the body it moves.
+#: Least ratio of a pivot to the mean inertia of the body that it moves.
 PIVOT_FLOOR = Fraction(1, 10**14)
 
 
 class ScheduleInterpreter(RowSlots):
-    """One replay of sweeps.  `staged`: transport goes stage by stage, where what is known folds;
-    `inverse`: accelerations are given; `refined`: they are an answer of a tree, to which that of
-    what they leave over is added; `level`: "gaping" or "slipping", what is corrected of closed
-    loops; `way`: the only bodies that are met, all with poses."""
+    """Evaluation of sweeps on one graph.
+
+    `staged`: transport stage by stage, so that known values fold; `inverse`: accelerations are
+    given; `refined`: accelerations are a solution of the tree to which that of the residual is
+    added; `level`: corrected quantity of closed loops, "gaping" or "slipping"; `way`: evaluate
+    only these bodies, all with poses.
+    """
 
     def __init__(
         self, state: FusionState, staged: bool = True, inverse: bool = False, level: str = "",
@@ -59,56 +62,58 @@ class ScheduleInterpreter(RowSlots):
         super().__init__(state)
         self.staged, self.inverse, self.level = staged, inverse or refined, level
         self.refined = refined
-        #: Conditions of guards, which code without failure codes asks for as a whole.
+        #: Guard conditions, for code without failure codes that needs their conjunction.
         self.conditions: list[Node] = []
         self._values: Nodes = []
-        #: What couplings lack.
+        #: Errors of couplings at the current level.
         self.lacks: list[tuple[CouplingStructure, Node]] = []
-        self._met = range(len(state.structure.bodies)) if way is None else sorted(way)
-        self._posed = self._bodies_with_poses() if way is None else set(way)
+        self._bodies_visited = range(len(state.structure.bodies)) if way is None else sorted(way)
+        self._bodies_posed = self._bodies_with_poses() if way is None else set(way)
 
     # --- passes ---------------------------------------------------------------------------------
 
     def sweep(self, sweep: Sweep) -> None:
-        """All passes of a sweep."""
+        """Evaluate all passes of a sweep."""
         for run in sweep.runs:
-            if not all(self._scene_has(trait) == wanted for trait, wanted in run.traits):
+            if not all(self._scene_has(trait) == required for trait, required in run.traits):
                 continue
             if run.whole is None:
                 getattr(self, f"_{run.hook}")()
             else:
                 self._pass(run.whole)
 
-    def _pass(self, whole: Pass) -> None:
-        subjects = self._subjects(whole)
-        for subject in reversed(subjects) if whole.order == TIPS_TO_ROOT else subjects:
+    def _pass(self, body_pass: Pass) -> None:
+        subjects = self._subjects(body_pass)
+        for subject in reversed(subjects) if body_pass.order == TIPS_TO_ROOT else subjects:
             self.enter(subject)
-            if not (whole.skip and self._holds(whole.skip)):
-                self.steps(whole.steps)
+            if not (body_pass.skip and self._holds(body_pass.skip)):
+                self.steps(body_pass.steps)
 
-    def _subjects(self, whole: Pass) -> list[Subject]:
+    def _subjects(self, body_pass: Pass) -> list[Subject]:
         s = self.state.structure
-        if whole.subject == "body":
+        if body_pass.subject == "body":
             return [
-                self.body_subject(i) for i in self._met if whole is not POSES or i in self._posed
+                self.body_subject(i)
+                for i in self._bodies_visited
+                if body_pass is not POSES or i in self._bodies_posed
             ]
-        if whole.subject == "row":
+        if body_pass.subject == "row":
             return [row_subject(s.rows, i) for i, row in enumerate(s.rows) if row.body == GROUND]
-        if whole.subject == "coupling":
-            return [Subject({"body": GROUND}, row=one.row) for one in s.couplings]
-        if whole.subject == "law":
+        if body_pass.subject == "coupling":
+            return [Subject({"body": GROUND}, row=coupling.row) for coupling in s.couplings]
+        if body_pass.subject == "law":
             return [Subject({"body": x.body}, law=x, index=i) for i, x in enumerate(s.laws)]
-        if whole.subject == "load":
+        if body_pass.subject == "load":
             return [
                 Subject({"body": x.body, "on": x.body, "axes": x.axes}, load=x, index=i)
                 for i, x in enumerate(s.loads)
             ]
-        if whole.subject == "force":
+        if body_pass.subject == "force":
             return [
                 Subject({"body": GROUND, "from": x.body_f, "to": x.body_t}, force=x, index=i)
                 for i, x in enumerate(s.forces)
             ]
-        if whole.subject == "drive":
+        if body_pass.subject == "drive":
             return [Subject({"body": body}, index=k) for k, (body, _) in enumerate(s.driven)]
         return [Subject({"body": GROUND}, index=k) for k in range(s.nu)]
 
@@ -118,19 +123,18 @@ class ScheduleInterpreter(RowSlots):
         return Subject(roles if closure is None else roles | {"outboard": closure.outboard})
 
     def _bodies_with_poses(self) -> set[int]:
-        """Bodies that loads, force elements and closures need, and those between them and the
-        ground."""
+        """Bodies whose poses loads, forces or closures need, and their inboard bodies."""
         s = self.state.structure
-        asked = [x for load in s.loads for x in (load.body, load.axes)]
-        asked += [x for force in s.forces for x in (force.body_f, force.body_t)]
-        asked += [i for i, body in enumerate(s.bodies) if body.modal and body.modal.drag]
-        asked += [x for closure in s.closures for x in (closure.frame, closure.outboard)]
-        found: set[int] = set()
-        for index in asked:
-            while index >= 0 and index not in found:
-                found.add(index)
+        indices = [x for load in s.loads for x in (load.body, load.axes)]
+        indices += [x for force in s.forces for x in (force.body_f, force.body_t)]
+        indices += [i for i, body in enumerate(s.bodies) if body.modal and body.modal.drag]
+        indices += [x for closure in s.closures for x in (closure.frame, closure.outboard)]
+        posed: set[int] = set()
+        for index in indices:
+            while index >= 0 and index not in posed:
+                posed.add(index)
                 index = s.bodies[index].parent
-        return found
+        return posed
 
     # --- the scene's expressions ----------------------------------------------------------------
 
@@ -157,20 +161,20 @@ class ScheduleInterpreter(RowSlots):
 
     def _scene_has(self, trait: str) -> bool:
         s = self.state.structure
-        known = {
+        traits = {
             "linked": False, "product": False, "qr": False,
             "refined": self.refined, "residual": self.refined,
             "couplings": bool(s.couplings), "looped": s.closes, "balance": not self.level,
             "efforts": True, "inverse": self.inverse, "weightless": False,
             "driving": not self.level,
             "laws": bool(s.laws), "driven": s.drives is not None,
-            "valued": s.values is not None, "posed": bool(self._posed),
+            "valued": s.values is not None, "posed": bool(self._bodies_posed),
             "flexible": any(body.modal for body in s.bodies),
         }  # fmt: skip
-        return known[trait]
+        return traits[trait]
 
     def _has(self, trait: str) -> bool:
-        """Whether the subject has a trait; see `schedule.words`."""
+        """Whether the subject has a trait; see `schedule.slot_definitions`."""
         if trait in ("balance", "efforts", "inverse", "weightless", "driving", "refined"):
             return self._scene_has(trait)
         if trait in ("gaping", "slipping"):
@@ -184,11 +188,11 @@ class ScheduleInterpreter(RowSlots):
         return _TRAITS[trait](self, self.body)
 
     def free(self) -> list[int]:
-        """Speeds of the hinge at hand that nobody imposes."""
+        """Speeds of the current hinge that are not prescribed."""
         return [k for k in range(self.body.nu) if not self.body.imposed[k]]
 
     def own_elimination(self) -> bool:
-        """Whether the hinge's own elimination fits; definitions of earlier versions have none."""
+        """Whether the hinge's own elimination applies; old definitions have none."""
         body = self.body
         if any(body.imposed) or any(x.value != 0 for x in self.get("body.rotor", 0)):
             return False
@@ -201,46 +205,46 @@ class ScheduleInterpreter(RowSlots):
     # --- steps ----------------------------------------------------------------------------------
 
     def steps(self, steps: Iterable[Step]) -> None:
-        """Steps of a pass at the subject at hand."""
+        """Execute steps of a pass for the current subject."""
         for step in steps:
             if not step.when or self._holds(step.when):
-                _DO[type(step)](self, step)
+                _EXECUTE[type(step)](self, step)
 
-    def _do(self, step: RunPass) -> None:
+    def _run_steps(self, step: RunPass) -> None:
         assert step.whole is not None
         self.steps(step.whole.steps)
 
-    def _each(self, step: ForEach) -> None:
+    def _for_each(self, step: ForEach) -> None:
         at, local = self.at, self.local
         for subject in self.met(step.of):
             self.at = subject
-            self.steps(_at_entry(inner, "c", subject.direction) for inner in step.steps)
+            self.steps(_with_entry(inner, "c", subject.direction) for inner in step.steps)
         self.at, self.local = at, local
 
     def _rows_begun(self) -> None:
-        """Slots of rows begin with what `RowSlots` gives, and those of couplings with numbers."""
+        """Compute the errors of couplings; other row slots are initialised on first use."""
         self.lacks = list(coupling_inputs(self))
 
     def _struck(self) -> None:
-        """Nothing: events strike in the looped engine alone."""
+        """Do nothing: impacts are computed by the looped engine only."""
 
     def _rows_asked(self) -> None:
-        """Rows are asked for nothing but to be met."""
+        """Do nothing: rows have no target beyond closure."""
 
-    def _call(self, step: Call) -> None:
+    def _run_kernel(self, step: Call) -> None:
         kernel, ports = self._kernel(step.kernel), dict(step.ports)
         n = self.modal.n if kernel.size_symbol else 0
         sizes = {port.name: port.length(n) for port in kernel.inputs}
-        given = {name: self.get(ports[name], size)[:size] for name, size in sizes.items()}
-        found = self.state.inline.run(kernel, given, self._guard(step.fails), n=n)
+        arguments = {name: self.get(ports[name], size)[:size] for name, size in sizes.items()}
+        results = self.state.inline.run(kernel, arguments, self._guard(step.fails), n=n)
         for port in kernel.outputs:
             if port.name in ports:
-                self._put(ports[port.name], port, found[port.name])
+                self._store(ports[port.name], port, results[port.name])
 
-    def _put(self, slot: str, port: Port, nodes: Nodes) -> None:
+    def _store(self, slot: str, port: Port, nodes: Nodes) -> None:
         if port.accumulate:
-            before = self.get(slot, len(nodes))
-            nodes = [a + b for a, b in zip(before, nodes, strict=True)]
+            old = self.get(slot, len(nodes))
+            nodes = [a + b for a, b in zip(old, nodes, strict=True)]
         self.fill(slot, nodes)
 
     def _kernel(self, name: str) -> KernelIR:
@@ -269,7 +273,8 @@ class ScheduleInterpreter(RowSlots):
                 self.conditions.append(condition)
                 return
             positive = condition.op == "lt" and condition.args[0].value == 0
-            if not (positive and reason == "undetermined"):  # pivots are judged more severely
+            # `_judge_pivots` applies a stricter limit to these pivots.
+            if not (positive and reason == "undetermined"):
                 self.state.fail_unless(condition, int(FailureCode[reason.upper()]), element, code)
 
         return guard
@@ -301,48 +306,48 @@ class ScheduleInterpreter(RowSlots):
             assert law is not None
             self._add_at("body.tau", law.speed, terms)
             return
-        before = self.get(step.to, len(terms))
+        old = self.get(step.to, len(terms))
         if step.times < 0:
-            self.fill(step.to, [a - b for a, b in zip(before, terms, strict=True)])
+            self.fill(step.to, [a - b for a, b in zip(old, terms, strict=True)])
         else:
-            self.fill(step.to, [a + b for a, b in zip(before, terms, strict=True)])
+            self.fill(step.to, [a + b for a, b in zip(old, terms, strict=True)])
 
     def _add_at(self, slot: str, first: int, terms: Nodes) -> None:
-        whole = list(self.get(slot, 0))
+        nodes = list(self.get(slot, 0))
         for k, term in enumerate(terms, first):
-            whole[k] = whole[k] + term
-        self.fill(slot, whole)
+            nodes[k] = nodes[k] + term
+        self.fill(slot, nodes)
 
-    def _pick(self, step: SelectColumns) -> None:
+    def _select_columns(self, step: SelectColumns) -> None:
         source, nu = self.get(step.source, 0), self.body.nu
         picked = [source[row * nu + k] for row in range(step.rows) for k in self.free()]
         self.fill(step.to, picked)
 
-    def _spread(self, step: ScatterSpeeds) -> None:
+    def _scatter_speeds(self, step: ScatterSpeeds) -> None:
         free, nu = self.free(), self.body.nu
-        found = self.get(step.imposed, nu) if step.imposed else self.state.zeros(nu)
+        values = self.get(step.imposed, nu) if step.imposed else self.state.zeros(nu)
         rates = self.get(step.free, len(free)) if free else []
-        found = list(found)
+        values = list(values)
         for k, rate in zip(free, rates, strict=True):
-            found[k] = rate
-        self.fill(step.to, found)
+            values[k] = rate
+        self.fill(step.to, values)
 
     def _gather(self, step: Gather) -> None:
         owner, _, name = step.places.partition(".")
-        places: tuple[int, ...] = getattr(getattr(self.at, owner), name)
-        values = [self._values[place] if place >= 0 else self.state.zero for place in places]
+        indices: tuple[int, ...] = getattr(getattr(self.at, owner), name)
+        values = [self._values[index] if index >= 0 else self.state.zero for index in indices]
         self.fill(step.to, values)
 
     def _evaluate(self, step: Evaluate) -> None:
         owner, _, name = step.expression.partition(".")
         expression: ExpressionStructure = getattr(getattr(self.at, owner), name)
-        more = {port: self.get(slot, 0) for port, slot in step.given}
-        self.fill(step.to, self.state.expression(expression, **more))
+        inputs = {port: self.get(slot, 0) for port, slot in step.given}
+        self.fill(step.to, self.state.expression(expression, **inputs))
 
     def _each_speed(self, step: EachSpeed) -> None:
         for k in range(self.body.nu):
             if self.body.imposed[k] or not step.imposed:
-                self.steps(_at_entry(inner, "k", k) for inner in step.steps)
+                self.steps(_with_entry(inner, "k", k) for inner in step.steps)
 
     def _by_screw(self, step: ByScrew) -> None:
         rotation, position = self.get(step.rotation, 9), self.get(step.position, 3)
@@ -355,7 +360,7 @@ class ScheduleInterpreter(RowSlots):
             self.steps(step.otherwise)
 
     def _choose_bias(self, step: ChooseBias) -> None:
-        """Not with rotor inertia, whose effort goes with the whole acceleration."""
+        """Move known accelerations into the motion; skip rotors, which need all of udot."""
         body, nu = self.body, self.body.nu
         if any(body.imposed) or any(isinstance(x, int) or x != 0.0 for x in body.rotor):
             return
@@ -364,20 +369,20 @@ class ScheduleInterpreter(RowSlots):
         for k in range(nu):
             row = unit_row(subspace[k::nu])
             if row is not None:
-                place = row + 6 if row < 3 else row  # motion is w, wd, rdd
-                chosen[k] = -motion[place]
-                motion[place] = self.state.zero
+                entry = row + 6 if row < 3 else row  # motion is w, wd, rdd
+                chosen[k] = -motion[entry]
+                motion[entry] = self.state.zero
         self.fill(step.motion, motion)
         self.fill(step.chosen, chosen)
 
-    def _judge_pivots(self, step: CheckPivots) -> None:
-        """The body's own inertia counts; all that hangs on it where it has none."""
+    def _check_pivots(self, step: CheckPivots) -> None:
+        """Guard pivots relative to the body's own inertia, or the composite one if zero."""
         graph, count = self.state.graph, len(self.free())
-        own, whole = self.get(step.own, 21), self.get(step.whole, 21)
+        own, composite = self.get(step.own, 21), self.get(step.whole, 21)
         columns = self.get(step.subspace, 6 * count)
         mass, inertia = (
-            graph.constant(PIVOT_FLOOR / 3) * _total(own, whole, places)
-            for places in ((0, 6, 11), (15, 18, 20))
+            graph.constant(PIVOT_FLOOR / 3) * _own_or_composite(own, composite, entries)
+            for entries in ((0, 6, 11), (15, 18, 20))
         )
         for i, pivot in enumerate(self.get(step.pivots, count)):
             moves = any(x.value != 0 for x in columns[i::count][:3])
@@ -385,31 +390,31 @@ class ScheduleInterpreter(RowSlots):
             self.state.fail_unless(condition, int(FailureCode[step.fails.upper()]), self.index, 1)
 
 
-def _total(own: Nodes, whole: Nodes, places: tuple[int, int, int]) -> Node:
-    a, b, c = places
+def _own_or_composite(own: Nodes, composite: Nodes, entries: tuple[int, int, int]) -> Node:
+    a, b, c = entries
     total = own[a] + own[b] + own[c]
-    return total if total.value != 0 else whole[a] + whole[b] + whole[c]
+    return total if total.value != 0 else composite[a] + composite[b] + composite[c]
 
 
-def _at_entry(step: Step, letter: str, number: int) -> Step:
-    """The step with the entry `number` in place of "[k]", row `number` in place of "[6 * k]"."""
+def _with_entry(step: Step, letter: str, index: int) -> Step:
+    """Step with the entry `number` in place of "[k]", row `number` in place of "[6 * k]"."""
 
-    def at(slot: str) -> str:
-        name, _, place = slot.partition("[")
-        width, times, found = place.rstrip("]").rpartition(" * ")
-        if found != letter:
+    def resolve(slot: str) -> str:
+        name, _, entry = slot.partition("[")
+        width, times, symbol = entry.rstrip("]").rpartition(" * ")
+        if symbol != letter:
             return slot
-        first, count = (int(width) * number, int(width)) if times else (number, 1)
+        first, count = (int(width) * index, int(width)) if times else (index, 1)
         return f"{name}[{' '.join(map(str, range(first, first + count)))}]"
 
     if isinstance(step, Call):
-        return replace(step, ports=tuple((port, at(slot)) for port, slot in step.ports))
+        return replace(step, ports=tuple((port, resolve(slot)) for port, slot in step.ports))
     if isinstance(step, (Add, Copy, Move)):
-        return replace(step, to=at(step.to), source=at(step.source))
+        return replace(step, to=resolve(step.to), source=resolve(step.source))
     return step
 
 
-def _axial(replay: ScheduleInterpreter, body: BodyStructure) -> bool:
+def _is_axial(replay: ScheduleInterpreter, body: BodyStructure) -> bool:
     rotation, position = replay.get("hinge.R", 9), replay.get("hinge.d", 3)
     return along_a_screw(rotation, position, replay.get("hinge.H", 0) if body.nu else [])
 
@@ -419,7 +424,7 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "parts": lambda replay, body: True,
     "whole": lambda replay, body: False,
     "staged": lambda replay, body: replay.staged,
-    "axial": _axial,
+    "axial": _is_axial,
     "special": lambda replay, body: replay.own_elimination(),
     "free": lambda replay, body: bool(replay.free()),
     "imposed": lambda replay, body: any(body.imposed),
@@ -447,19 +452,19 @@ _TRAITS: dict[str, Callable[[ScheduleInterpreter, BodyStructure], bool]] = {
     "unmoved": lambda replay, body: replay.rests(),
 }
 
-_DO: dict[type, Callable[..., None]] = {
-    RunPass: ScheduleInterpreter._do,
-    Call: ScheduleInterpreter._call,
+_EXECUTE: dict[type, Callable[..., None]] = {
+    RunPass: ScheduleInterpreter._run_steps,
+    Call: ScheduleInterpreter._run_kernel,
     Copy: ScheduleInterpreter._copy,
     Add: ScheduleInterpreter._add,
-    ForEach: ScheduleInterpreter._each,
+    ForEach: ScheduleInterpreter._for_each,
     Move: ScheduleInterpreter._copy,
-    SelectColumns: ScheduleInterpreter._pick,
-    ScatterSpeeds: ScheduleInterpreter._spread,
+    SelectColumns: ScheduleInterpreter._select_columns,
+    ScatterSpeeds: ScheduleInterpreter._scatter_speeds,
     Gather: ScheduleInterpreter._gather,
     Evaluate: ScheduleInterpreter._evaluate,
     EachSpeed: ScheduleInterpreter._each_speed,
     ByScrew: ScheduleInterpreter._by_screw,
     ChooseBias: ScheduleInterpreter._choose_bias,
-    CheckPivots: ScheduleInterpreter._judge_pivots,
+    CheckPivots: ScheduleInterpreter._check_pivots,
 }

@@ -1,4 +1,4 @@
-"""Slots of the schedule as nodes of one graph: what the scene gives, and what calls have filled."""
+"""Slots of the schedule as graph nodes: scene data, and outputs of calls."""
 
 from __future__ import annotations
 
@@ -20,14 +20,17 @@ from mstmm.ir.scene_structure import (
 from ..schedule.slot_definitions import ROLES
 from .fusion_state import FusionState
 
-#: The ground, a body without a number.
+#: Index of the ground.
 GROUND = -1
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What a pass is at: a body (by its roles), and the law, load, force, drive or row if it is
-    one; of rows those met with it, and the direction of its hinge whose row it is."""
+    """Current item of a pass: a body (by its roles) and the law, load, force, drive or row.
+
+    `other` and `second` are rows paired with `row`; `direction` is its direction at the
+    closure.
+    """
 
     roles: dict[str, int]
     law: LawStructure | None = None
@@ -41,7 +44,7 @@ class Subject:
 
 
 class Slots:
-    """Nodes by slot.  `local` slots end with the subject."""
+    """Nodes by slot.  `local` slots are cleared when the subject changes."""
 
     def __init__(self, state: FusionState) -> None:
         self.state = state
@@ -49,80 +52,80 @@ class Slots:
         self.local: dict[str, Nodes] = {}
         self.at = Subject({})
         gravity = [-g for g in state.entries(state.structure.gravity)]
-        still = {"A": state.identity(), "motion": [*state.zeros(6), *gravity]}
+        initial = {"A": state.identity(), "motion": [*state.zeros(6), *gravity]}
         sizes = {"x": 3, "v": 3, "delta": 6, "e": 6, "S": 21}
-        still |= {name: state.zeros(size) for name, size in sizes.items()}
-        self._filled |= {(GROUND, f"body.{name}"): nodes for name, nodes in still.items()}
+        initial |= {name: state.zeros(size) for name, size in sizes.items()}
+        self._filled |= {(GROUND, f"body.{name}"): nodes for name, nodes in initial.items()}
         self._filled[0, "sums.power"] = self._filled[0, "sums.potential"] = [state.zero]
 
     # --- the subject ----------------------------------------------------------------------------
 
     def enter(self, subject: Subject) -> None:
-        """What slots are meant of from now on."""
+        """Make `subject` the one that slots refer to."""
         self.at, self.local = subject, {}
 
     @property
     def index(self) -> int:
-        """Place of the body at hand."""
+        """Index of the current body."""
         return self.at.roles["body"]
 
     @property
     def body(self) -> BodyStructure:
-        """The body at hand."""
+        """Current body."""
         return self.state.structure.bodies[self.index]
 
     @property
     def frame(self) -> int:
-        """Place of the flexible body that the body at hand belongs to."""
+        """Index of the flexible body that the current body belongs to."""
         section = self.body.section
         return self.index if section is None else section.frame
 
     @property
     def modal(self) -> ModalStructure:
-        """The modes that the body at hand belongs to."""
-        found = self.state.structure.bodies[self.frame].modal
-        assert found is not None
-        return found
+        """Modes that the current body belongs to."""
+        modes = self.state.structure.bodies[self.frame].modal
+        assert modes is not None
+        return modes
 
     # --- reading and filling --------------------------------------------------------------------
 
     def get(self, slot: str, length: int) -> Nodes:
-        """Nodes of a slot; `length` says how many numbers a constant has."""
+        """Nodes of a slot; `length` is the size of a constant."""
         if slot == "identity":
             return self.state.identity()
         if slot in ("zero", "none"):
             return self.state.zeros(length)
-        name, _, picked = slot.partition("[")
-        found = self._whole(name)
-        if picked:
-            found = [found[int(place)] for place in picked.rstrip("]").split()]
-        return found
+        name, _, entries = slot.partition("[")
+        nodes = self._all_nodes(name)
+        if entries:
+            nodes = [nodes[int(index)] for index in entries.rstrip("]").split()]
+        return nodes
 
-    def _whole(self, slot: str) -> Nodes:
+    def _all_nodes(self, slot: str) -> Nodes:
         if slot.startswith("local."):
             return self.local[slot]
         key = self._key(slot)
         if key not in self._filled:
-            self._filled[key] = self._given(slot)
+            self._filled[key] = self._scene_data(slot)
         return self._filled[key]
 
     def fill(self, slot: str, nodes: Nodes) -> None:
-        """Put nodes into a slot, or into the entries that are named."""
-        name, _, picked = slot.partition("[")
-        if picked:
-            whole = list(self._whole(name))
-            for place, node in zip(picked.rstrip("]").split(), nodes, strict=True):
-                whole[int(place)] = node
-            nodes = whole
+        """Store nodes in a slot, or in the entries named in brackets."""
+        name, _, entries = slot.partition("[")
+        if entries:
+            all_nodes = list(self._all_nodes(name))
+            for index, node in zip(entries.rstrip("]").split(), nodes, strict=True):
+                all_nodes[int(index)] = node
+            nodes = all_nodes
         if name.startswith("local."):
             self.local[name] = nodes
         elif name in ("drive.q", "drive.u", "drive.s"):
-            self._prescribe(name, nodes[0])
+            self._store_prescribed(name, nodes[0])
         else:
             self._filled[self._key(name)] = nodes
 
-    def _prescribe(self, slot: str, node: Node) -> None:
-        """A driven coordinate, its speed or its acceleration, where everybody reads it."""
+    def _store_prescribed(self, slot: str, node: Node) -> None:
+        """Store a prescribed coordinate, speed or acceleration in the state vectors."""
         f, speed = self.state, self.state.structure.driven[self.at.index][1]
         if slot == "drive.s":
             self.fill(f"body.s[{speed}]", [node])
@@ -132,21 +135,21 @@ class Slots:
             f.u[self.body.u + speed] = node
 
     def filled(self, index: int, slot: str) -> Nodes | None:
-        """What a slot of a body holds; None if nothing was put there."""
+        """Nodes stored in a slot of a body; None if it is empty."""
         return self._filled.get((index, slot))
 
     def gathered(self, name: str) -> Nodes:
-        """What every body and its modes have in the slot `name`, in the order of the state."""
+        """Slot `name` of all bodies and their modes, in the order of the state."""
         s = self.state.structure
-        found = self.state.zeros(s.nq if name == "qdot" else s.nu)
+        vector = self.state.zeros(s.nq if name == "qdot" else s.nu)
         for index, body in enumerate(s.bodies):
             first = body.q if name == "qdot" else body.u
-            own = self.filled(index, f"body.{name}") or []
-            found[first : first + len(own)] = own
+            nodes = self.filled(index, f"body.{name}") or []
+            vector[first : first + len(nodes)] = nodes
             if body.modal is not None:
                 first = body.modal.q if name == "qdot" else body.modal.u
-                found[first : first + body.modal.n] = self.filled(index, f"modes.{name}") or []
-        return found
+                vector[first : first + body.modal.n] = self.filled(index, f"modes.{name}") or []
+        return vector
 
     def _key(self, slot: str) -> Hashable:
         owner, _, name = slot.partition(".")
@@ -162,10 +165,10 @@ class Slots:
 
     # --- what the scene gives -------------------------------------------------------------------
 
-    def _given(self, slot: str) -> Nodes:
+    def _scene_data(self, slot: str) -> Nodes:
         owner, _, name = slot.partition(".")
-        if name == "w":  # the first of a motion
-            return self._whole(f"{owner}.motion")[:3]
+        if name == "w":  # a motion starts with w
+            return self._all_nodes(f"{owner}.motion")[:3]
         owner = "body" if owner in ROLES else owner
         read: Callable[[str], Nodes] = getattr(self, f"_{owner}")
         return read(name)
@@ -184,7 +187,7 @@ class Slots:
     def _hinge(self, name: str) -> Nodes:
         if name == "p":
             return self.state.entries(self.body.hinge_p)
-        return []  # no speeds: no columns of H, nothing eliminated
+        return []  # without speeds H has no columns and nothing is eliminated
 
     def _connection(self, name: str) -> Nodes:
         f, body = self.state, self.body
@@ -198,13 +201,13 @@ class Slots:
         return rotation
 
     def _link(self, name: str) -> Nodes:
-        """The constant part of the hinge's own screw."""
+        """Constant part of the hinge's own screw."""
         f, body = self.state, self.body
         angle, shift = f.entries(body.link[3:])
         if name == "lift":
             return [f.zero, f.zero, shift]
         place = rotation_coordinate(body.hinge)
-        return [x + angle if k == place else x for k, x in enumerate(self._whole("body.q"))]
+        return [x + angle if k == place else x for k, x in enumerate(self._all_nodes("body.q"))]
 
     def _modes(self, name: str) -> Nodes:
         f, modal = self.state, self.modal

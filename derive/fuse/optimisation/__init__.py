@@ -1,1 +1,1 @@
-"""What makes a straight line of code fast: order, balance, registers, angles together."""
+"""Optimisation of straight-line code: order, balanced sums, paired sines and cosines."""

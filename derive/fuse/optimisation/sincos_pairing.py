@@ -1,8 +1,8 @@
-"""Which sines and cosines of a kernel belong together, and where they can be computed.
+"""Pairs of sines and cosines of one argument, and the level at which they can be computed.
 
 Sine and cosine of one argument cost little more than either; four arguments in a vector cost about
-what one costs.  Arguments are sorted by how many other sines stand in the way of knowing them:
-those that need none (coordinates, times, sums of them) are computed first of all, together.
+as much as one.  Arguments are sorted by the number of sines that they depend on in sequence: those
+that need none (coordinates, times, sums of them) are computed first and together.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .statement_units import operands
 
 @dataclass
 class Angle:
-    """One argument, and the temporaries that are its sine and its cosine."""
+    """One argument, and the temporaries of its sine and cosine."""
 
     argument: Operand
     sines: list[int] = field(default_factory=list)
@@ -26,7 +26,7 @@ class Angle:
 
 @dataclass
 class Level:
-    """Statements that need the angles of earlier levels, then this level's own angles."""
+    """Statements that need the angles of earlier levels, then the angles of this level."""
 
     statements: list[Assign] = field(default_factory=list)
     angles: list[Angle] = field(default_factory=list)
@@ -34,24 +34,24 @@ class Level:
 
 @dataclass(frozen=True)
 class SincosLevels:
-    """A kernel's statements with its angles taken out: levels first, then everything else."""
+    """Statements of a kernel with its angles extracted: levels first, then the rest."""
 
     levels: tuple[Level, ...]
     rest: tuple[Assign | Store | Guard, ...]
 
     def made(self) -> list[int]:
-        """Temporaries of the levels."""
-        found = []
+        """Temporaries that the levels define."""
+        numbers = []
         for level in self.levels:
-            found += [statement.number for statement in level.statements]
-            found += [n for angle in level.angles for n in (*angle.sines, *angle.cosines)]
-        return found
+            numbers += [statement.number for statement in level.statements]
+            numbers += [n for angle in level.angles for n in (*angle.sines, *angle.cosines)]
+        return numbers
 
 
 def gather(statements: Sequence[Statement]) -> SincosLevels:
-    """Take the sines and cosines out of a straight line, each as early as its argument allows.
+    """Extract sines and cosines from straight-line code, each as early as its argument allows.
 
-    What no argument needs keeps its order and stands behind the last level.
+    Statements that no argument needs keep their order and follow the last level.
     """
     depth: dict[int, int] = {}
     angles: dict[Operand, Angle] = {}
@@ -60,28 +60,28 @@ def gather(statements: Sequence[Statement]) -> SincosLevels:
         if not isinstance(statement, Assign):
             continue
         needed[statement.number] = statement
-        below = max((_depth(a, depth) for a in statement.args), default=0)
+        level = max((_depth(a, depth) for a in statement.args), default=0)
         if statement.op not in ("sin", "cos"):
-            depth[statement.number] = below
+            depth[statement.number] = level
             continue
-        depth[statement.number] = below + 1
+        depth[statement.number] = level + 1
         angle = angles.setdefault(statement.args[0], Angle(statement.args[0]))
         (angle.sines if statement.op == "sin" else angle.cosines).append(statement.number)
     levels = [Level() for _ in range(max(depth.values(), default=0))]
     for argument, angle in angles.items():
         levels[_depth(argument, depth)].angles.append(angle)
-    return _placed(levels, statements, needed)
+    return _fill_levels(levels, statements, needed)
 
 
 def _depth(operand: Operand, depth: dict[int, int]) -> int:
     return depth[operand.number] if isinstance(operand, Temporary) else 0
 
 
-def _placed(
+def _fill_levels(
     levels: Sequence[Level], statements: Sequence[Statement], assigns: dict[int, Assign]
 ) -> SincosLevels:
-    """Move what the levels' arguments are made of in front of them."""
-    place = {number: position for position, number in enumerate(assigns)}
+    """Move the statements that the levels' arguments need in front of them."""
+    position_of = {number: position for position, number in enumerate(assigns)}
     done: set[int] = {
         number
         for level in levels
@@ -89,9 +89,11 @@ def _placed(
         for number in (*angle.sines, *angle.cosines)
     }
     for level in levels:
-        wanted = _closure((angle.argument for angle in level.angles), assigns, done)
-        level.statements = [assigns[number] for number in sorted(wanted, key=place.__getitem__)]
-        done |= wanted
+        missing = _missing_temporaries((angle.argument for angle in level.angles), assigns, done)
+        level.statements = [
+            assigns[number] for number in sorted(missing, key=position_of.__getitem__)
+        ]
+        done |= missing
     rest = tuple(
         s
         for s in statements
@@ -100,13 +102,15 @@ def _placed(
     return SincosLevels(tuple(levels), rest)
 
 
-def _closure(roots: Iterable[Operand], assigns: dict[int, Assign], done: set[int]) -> set[int]:
-    """Temporaries behind `roots` that are not computed yet."""
-    found: set[int] = set()
+def _missing_temporaries(
+    roots: Iterable[Operand], assigns: dict[int, Assign], done: set[int]
+) -> set[int]:
+    """Temporaries that `roots` depend on and that are not yet computed."""
+    missing: set[int] = set()
     stack = list(roots)
     while stack:
         operand = stack.pop()
-        if isinstance(operand, Temporary) and operand.number not in found | done:
-            found.add(operand.number)
+        if isinstance(operand, Temporary) and operand.number not in missing | done:
+            missing.add(operand.number)
             stack.extend(operands(assigns[operand.number]))
-    return found
+    return missing

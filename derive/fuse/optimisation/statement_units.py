@@ -1,4 +1,4 @@
-"""Statements of a straight line: what each reads, and which of them are one instruction."""
+"""Operands of straight-line statements, and statements that form one instruction."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Line = Assign | Store | Guard
 
 
 def operands(statement: object) -> tuple[Operand, ...]:
-    """What a statement of a straight-line kernel reads."""
+    """Operands that a statement of a straight-line kernel reads."""
     if isinstance(statement, Assign):
         return statement.args
     if isinstance(statement, Store):
@@ -20,10 +20,10 @@ def operands(statement: object) -> tuple[Operand, ...]:
 
 
 def units_of(statements: Sequence[Line]) -> list[list[Line]]:
-    """Statements one by one, but a product beside the sum that alone reads it: one instruction."""
+    """Statements one by one, but a product together with the only sum that reads it (fused)."""
     readers: dict[int, int] = {}
     for statement in statements:
-        for number in _reads(statement):
+        for number in _temporaries_read(statement):
             readers[number] = readers.get(number, 0) + 1
     products = {
         s.number: s
@@ -31,31 +31,31 @@ def units_of(statements: Sequence[Line]) -> list[list[Line]]:
         if isinstance(s, Assign) and s.op == "mul" and readers.get(s.number) == 1
     }
     fused: dict[int, Assign] = {}
-    for place, statement in enumerate(statements):
+    for index, statement in enumerate(statements):
         if isinstance(statement, Assign) and statement.op in ("add", "sub"):
-            found = [number for number in _reads(statement) if number in products]
-            if found:
-                fused[place] = products.pop(found[0])
-    moved = {product.number for product in fused.values()}
+            numbers = [number for number in _temporaries_read(statement) if number in products]
+            if numbers:
+                fused[index] = products.pop(numbers[0])
+    fused_numbers = {product.number for product in fused.values()}
     return [
-        [fused[place], s] if place in fused else [s]
-        for place, s in enumerate(statements)
-        if not (isinstance(s, Assign) and s.number in moved)
+        [fused[index], s] if index in fused else [s]
+        for index, s in enumerate(statements)
+        if not (isinstance(s, Assign) and s.number in fused_numbers)
     ]
 
 
-def _reads(statement: Line) -> list[int]:
+def _temporaries_read(statement: Line) -> list[int]:
     return [a.number for a in operands(statement) if isinstance(a, Temporary)]
 
 
 def reads_of(units: Sequence[Sequence[Line]]) -> list[set[int]]:
-    """The units that each unit waits for; guards keep their order."""
+    """Units that each unit depends on; guards keep their order."""
     makers = {s.number: k for k, unit in enumerate(units) for s in unit if isinstance(s, Assign)}
-    before = [
-        {makers[n] for s in unit for n in _reads(s) if n in makers and makers[n] != k}
+    dependencies = [
+        {makers[n] for s in unit for n in _temporaries_read(s) if n in makers and makers[n] != k}
         for k, unit in enumerate(units)
     ]
     guards = [k for k, unit in enumerate(units) if isinstance(unit[-1], Guard)]
     for earlier, later in pairwise(guards):
-        before[later].add(earlier)
-    return before
+        dependencies[later].add(earlier)
+    return dependencies

@@ -1,8 +1,8 @@
-"""Sums of a straight-line kernel, regrouped so that no result waits longer than it must.
+"""Regrouped sums of a straight-line kernel: shorter dependency chains.
 
-A sum written term by term is a chain of additions; its last term may be ready long before the
-chain gets there.  Each maximal sum whose partial sums nobody else reads is taken apart and put
-together again, terms that are ready early first.  Values change by rounding alone.
+A sum written term by term is a chain of additions; its last term may be ready long before the chain
+reaches it.  Each maximal sum whose partial sums have no other reader is split and rebuilt with
+early terms first.  Values change by rounding only.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from mstmm.ir import OPERATIONS, Assign, Guard, KernelIR, Operand, Statement, Store, Temporary
 
-#: Cycles that a sum or a product takes; they are one when a product is added.
+#: Latency of a sum or a product in cycles; an added product is fused and counts once.
 _SUM = OPERATIONS["add"].latency
 
 #: A signed term: (ready, tie-break, negative, operand, is a product that fuses with an addition).
@@ -20,27 +20,27 @@ _Term = tuple[float, int, bool, Operand, bool]
 
 
 def balance(kernel: KernelIR) -> KernelIR:
-    """The same kernel with regrouped sums.  Straight-line kernels only."""
+    """Same kernel with regrouped sums; straight-line kernels only."""
     return _Balance(kernel).run()
 
 
 class BalancedKernels(Mapping[str, KernelIR]):
-    """Kernels with regrouped sums, each made when it is asked for."""
+    """Kernels with regrouped sums, each computed on first access."""
 
     def __init__(self, *made: KernelIR) -> None:
-        self._made = {kernel.name: kernel for kernel in made}
+        self._originals = {kernel.name: kernel for kernel in made}
         self._balanced: dict[str, KernelIR] = {}
 
     def __getitem__(self, name: str) -> KernelIR:
         if name not in self._balanced:
-            self._balanced[name] = balance(self._made[name])
+            self._balanced[name] = balance(self._originals[name])
         return self._balanced[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._made)
+        return iter(self._originals)
 
     def __len__(self) -> int:
-        return len(self._made)
+        return len(self._originals)
 
 
 class _Balance:
@@ -52,15 +52,15 @@ class _Balance:
             for operand in operands(statement):
                 if isinstance(operand, Temporary):
                     self.uses[operand.number] = self.uses.get(operand.number, 0) + 1
-        self.inner = self._inner()
+        self.inner = self._inner_sums()
         self.ready: dict[int, float] = {}
         self.statements: list[Statement] = []
         self.names: dict[int, Operand] = {}
         self.next = 0
 
-    def _inner(self) -> set[int]:
+    def _inner_sums(self) -> set[int]:
         """Partial sums that only one other sum reads."""
-        found = set()
+        numbers = set()
         for statement in self.by_number.values():
             if statement.op not in ("add", "sub"):
                 continue
@@ -68,20 +68,20 @@ class _Balance:
                 if not isinstance(operand, Temporary) or self.uses[operand.number] > 1:
                     continue
                 if self.by_number[operand.number].op in ("add", "sub"):
-                    found.add(operand.number)
-        return found
+                    numbers.add(operand.number)
+        return numbers
 
     def run(self) -> KernelIR:
         k = self.kernel
         for statement in k.statements:
             if isinstance(statement, Assign):
                 if statement.number not in self.inner:
-                    self._place(statement)
+                    self._add_statement(statement)
             elif isinstance(statement, Store):
-                value = self._renamed(statement.value)
+                value = self._new_operand(statement.value)
                 self.statements.append(Store(statement.port, statement.index, value))
             elif isinstance(statement, Guard):
-                condition = self._renamed(statement.condition)
+                condition = self._new_operand(statement.condition)
                 self.statements.append(Guard(condition, statement.code, statement.message))
             else:
                 raise ValueError(f"{k.name}: a run-time sized kernel has no sums to regroup")
@@ -89,10 +89,10 @@ class _Balance:
             k.name, k.inputs, k.outputs, tuple(self.statements), None, k.purpose, k.sources
         )
 
-    def _renamed(self, operand: Operand) -> Operand:
+    def _new_operand(self, operand: Operand) -> Operand:
         return self.names[operand.number] if isinstance(operand, Temporary) else operand
 
-    def _when(self, operand: Operand) -> float:
+    def _ready_time(self, operand: Operand) -> float:
         return self.ready[operand.number] if isinstance(operand, Temporary) else 0.0
 
     def _emit(self, op: str, args: Sequence[Operand], ready: float) -> Temporary:
@@ -102,24 +102,24 @@ class _Balance:
         self.ready[result.number] = ready
         return result
 
-    def _place(self, statement: Assign) -> None:
+    def _add_statement(self, statement: Assign) -> None:
         if statement.op in ("add", "sub"):
             terms = self._terms(statement)
             if len(terms) > 2:
-                self.names[statement.number] = self._sum(terms)
+                self.names[statement.number] = self._balanced_sum(terms)
                 return
-        args = [self._renamed(a) for a in statement.args]
-        ready = max(map(self._when, args), default=0.0) + OPERATIONS[statement.op].latency
+        args = [self._new_operand(a) for a in statement.args]
+        ready = max(map(self._ready_time, args), default=0.0) + OPERATIONS[statement.op].latency
         self.names[statement.number] = self._emit(statement.op, args, ready)
 
     def _terms(self, statement: Assign) -> list[tuple[bool, Operand]]:
-        """(negative, operand) of a sum, partial sums opened."""
-        found: list[tuple[bool, Operand]] = []
+        """(negative, operand) of a sum with its partial sums expanded."""
+        terms: list[tuple[bool, Operand]] = []
         stack: list[tuple[bool, Operand]] = []
 
-        def open_sum(sum_: Assign, negative: bool) -> None:
-            left, right = sum_.args
-            stack.append((negative != (sum_.op == "sub"), right))
+        def open_sum(total: Assign, negative: bool) -> None:
+            left, right = total.args
+            stack.append((negative != (total.op == "sub"), right))
             stack.append((negative, left))
 
         open_sum(statement, False)
@@ -128,10 +128,10 @@ class _Balance:
             if isinstance(operand, Temporary) and operand.number in self.inner:
                 open_sum(self.by_number[operand.number], negative)
             else:
-                found.append((negative, operand))
-        return found
+                terms.append((negative, operand))
+        return terms
 
-    def _sum(self, terms: list[tuple[bool, Operand]]) -> Temporary:
+    def _balanced_sum(self, terms: list[tuple[bool, Operand]]) -> Temporary:
         heap: list[_Term] = []
         for order, (negative, operand) in enumerate(terms):
             product = (
@@ -139,8 +139,8 @@ class _Balance:
                 and self.uses[operand.number] == 1
                 and self.by_number[operand.number].op == "mul"
             )
-            renamed = self._renamed(operand)
-            ready = self._when(renamed) - (_SUM if product else 0)
+            renamed = self._new_operand(operand)
+            ready = self._ready_time(renamed) - (_SUM if product else 0)
             heapq.heappush(heap, (ready, order, negative, renamed, product))
         order = len(terms)
         while len(heap) > 1:
@@ -161,7 +161,7 @@ class _Balance:
 
 
 def operands(statement: Statement) -> tuple[Operand, ...]:
-    """What a straight-line statement reads."""
+    """Operands that a straight-line statement reads."""
     if isinstance(statement, Assign):
         return statement.args
     if isinstance(statement, Store):
