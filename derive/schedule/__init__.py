@@ -1,1 +1,1 @@
-"""The sweep as data: passes, and what each does with a body, by calls of kernels on slots."""
+"""The sweep as data: passes, and their steps as kernel calls on named slots."""

@@ -1,11 +1,11 @@
-"""The tangent without what velocities and loads add: the mass matrix, and in it the laws' slopes.
+"""Approximate tangent: mass matrix with the derivatives of hinge laws.
 
-It is symmetric, so that it is factored and solved as the mass matrix is: by the same passes over
-slots of its own, behind inverse dynamics, whose hinge motion stays as it is.
-Unknown are accelerations, with which speeds and coordinates change in proportion.  Of a law on
-several speeds the symmetric part of the slopes counts; loads, springs between bodies and what
-stiffens flexible bodies are left out.  An approximation, for iterations and for methods that allow
-one.
+Contributions of velocities and loads are omitted.  The matrix is symmetric and is factored and
+solved like the mass matrix: by the same passes over separate slots, after inverse dynamics, whose
+hinge motion is reused.  Unknowns are accelerations, with which speeds and coordinates change in
+proportion.  A law on several speeds contributes the symmetric part of its derivatives; loads,
+springs between bodies and geometric stiffness of flexible bodies are left out.  For iterations and
+for methods that allow an approximate tangent.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .pass_steps import (
 )
 from .tangent_sweep import HINGE_CHANGE, KNOWN_LAWS, LAW_CHANGE
 
-#: Where the mass matrix has its numbers, this tangent has those of its own.
+#: Slot of the mass matrix -> slot of this tangent.
 _SLOTS = {
     "body.S": "mass.S", "parent.S": "inboard.mass", "hinge.H_free": "tangent.H",
     "hinge.F": "mass.F", "hinge.G": "mass.G", "hinge.g": "tangent.y", "zero": "tangent.W",
@@ -92,7 +92,8 @@ LAWS_FACTORISE = Pass(
     _factorise.name, "body", "Mass matrices with laws carried to the root.",
     (
         SelectColumns(to="tangent.W", source="tangent.laws", rows=0),
-        *(step for step in _factorise.steps if step.when != "own"),  # hinges have their motion
+        # Inverse dynamics has left the motion of hinges.
+        *(step for step in _factorise.steps if step.when != "own"),
     ),
     order=FACTORISE.order, skip=FACTORISE.skip,
 )  # fmt: skip

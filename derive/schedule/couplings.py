@@ -1,9 +1,8 @@
-"""Couplings of coordinates: where their rows begin, and the efforts that their multipliers are.
+"""Couplings of coordinates: start of their rows, and efforts of their multipliers.
 
-A row begins at each hinge that it names.  In the tree its column is zero there, and -C is the
-effort of a multiplier of one; a hinge that closes a loop has its speeds from the two bodies that it
-joins.
-See docs/explanation/closed-loops.md.
+A row starts at each hinge that it names.  For a hinge of the tree its column is zero there, and -C
+is the effort of a unit multiplier; a hinge that closes a loop takes its speeds from the two bodies
+that it connects.  See docs/explanation/closed-loops.md.
 """
 
 from __future__ import annotations
@@ -12,18 +11,18 @@ from dataclasses import replace
 
 from .pass_steps import Add, EachSpeed, ForEach, Pass, Step, call, only
 
-#: What the accelerations of a hinge in the tree tell the rows that name it.
+#: Contribution of the accelerations of a tree hinge to the rows that name it.
 TOLD = call("generic{nu}.answered", when="coupled", y="body.s", z="pending.tau", l="pending.known")
-#: The same of those that were chosen for the bias motion.
+#: The same for the accelerations chosen in the bias motion.
 TOLD_OF_BIAS = replace(
     TOLD, ports=(("y", "body.chosen"), ("z", "pending.tau"), ("l", "pending.known"))
 )
-#: The same of a hinge that closes a loop: those along its rows, and those that are given.
+#: The same for a hinge that closes a loop: accelerations along its rows, and prescribed ones.
 _TOLD_BY_OWN = (
     call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
     call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
 )
-#: Rows that name a hinge's own speeds begin on both sides of it.
+#: Rows of couplings on a hinge's own speeds start on both sides of it.
 OF_OWN = ForEach(
     of="own",
     steps=(
@@ -36,29 +35,29 @@ OF_OWN = ForEach(
         *_TOLD_BY_OWN,
     ),
 )  # fmt: skip
-#: What else they are told where the bias motion chooses accelerations.
+#: Additional contribution where the bias motion chooses accelerations.
 OF_OWN_BIAS = ForEach(
     of="own",
     when="staged !corrected",
     steps=(call("generic{nu}.answered", y="body.chosen", z="own.tau", l="own.known"),),
 )
-#: The same where multipliers are known.
+#: The same with known multipliers.
 OWN_TOLD = ForEach(of="own", steps=_TOLD_BY_OWN)
 
 
 def efforts_of_own(x: str, when: str) -> ForEach:
-    """Efforts of couplings on own speeds, by their multipliers."""
+    """Efforts of couplings on own speeds, from their multipliers."""
     pull = call("generic{nu}.pull", y="own.tau", x=x, y_0="body.tau")
     return ForEach(of="own", when=when, steps=(pull,))
 
 
 def efforts_of(x: str, when: str, *more: Step) -> ForEach:
-    """Efforts of the couplings of a hinge in the tree, by their multipliers."""
+    """Efforts of the couplings of a tree hinge, from their multipliers."""
     pull = call("generic{nu}.pull", when="coupled", y="pending.tau", x=x, y_0="body.tau")
     return ForEach(of="pending", when=when, steps=(pull, *more))
 
 
-#: Multipliers are known here, from an evaluation of accelerations in the same workspace.
+#: Multipliers are known from an earlier evaluation of accelerations in this workspace.
 COUPLINGS_LOADED = Pass(
     "couplings_loaded", "body",
     "Rows of couplings at the accelerations that are given, and the efforts of their multipliers.",

@@ -1,8 +1,8 @@
-"""Passes differentiated: the same calls over the same slots, and their derivatives beside them.
+"""Differentiated passes: the same calls on the same slots, and on their derivatives.
 
-Of a slot `x` the derivative along a direction is the slot `d:x`.  It lies where `x` lies, in a
-second workspace; of numbers that no state moves it is zero.  A differentiated pass runs behind the
-pass itself, whose slots it reads; what the pass kept in local arrays alone is made again.
+The derivative of slot `x` along a direction is the slot `d:x`.  It has the same position in a
+second workspace; the derivative of constant data is zero.  A differentiated pass runs after the
+pass itself, whose slots it reads; values that the pass kept only in local arrays are recomputed.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from .pass_steps import Add, Call, Copy, EachSpeed, Evaluate, ForEach, Gather, P
 
 #: Prefix of the derivative of a slot.
 D = "d:"
-#: Suffix of a kernel's derivative, and of a pass's.
+#: Suffix of differentiated kernels and passes.
 SLOPE = "_slope"
-#: Conditions under which derivatives have nothing to do: sums of energy, code for one scene.
-_WITHOUT = ("balance", "staged")
+#: Conditions whose steps are not differentiated: energy sums, and code for one scene.
+_SKIPPED_TRAITS = ("balance", "staged")
 
 
 def differentiate_pass(whole: Pass) -> Pass:
-    """The derivative of a pass."""
+    """Pass that computes the derivatives of a pass."""
     return replace(
         whole,
         name=whole.name + SLOPE,
@@ -33,17 +33,19 @@ def differentiate_pass(whole: Pass) -> Pass:
 
 
 def slopes(steps: Iterable[Step]) -> Iterator[Step]:
-    """Steps and their derivatives, in an order in which both can be done."""
-    kept = [step for step in steps if not any((trait, True) in step.traits for trait in _WITHOUT)]
-    met = Counter(_local_slots(kept))
-    wanted = {slot for slot, calls in met.items() if calls > 1}
-    for step in kept:
-        yield from _step(step, wanted)
-        wanted -= set(_local_slots([step]))  # made by now
+    """Steps and their derivatives, in an executable order."""
+    retained = [
+        step for step in steps if not any((trait, True) in step.traits for trait in _SKIPPED_TRAITS)
+    ]
+    uses = Counter(_local_slots(retained))
+    reused = {slot for slot, calls in uses.items() if calls > 1}
+    for step in retained:
+        yield from _derivative_steps(step, reused)
+        reused -= set(_local_slots([step]))  # computed from here on
 
 
 def _local_slots(steps: Iterable[Step]) -> Iterator[str]:
-    """Local arrays that calls fill or read, once a call."""
+    """Local arrays that calls write or read, once per call."""
     for step in steps:
         if isinstance(step, Call):
             yield from (slot.partition("[")[0] for _, slot in step.ports if _is_local(slot))
@@ -59,21 +61,23 @@ def _is_local(slot: str) -> bool:
     return slot.startswith("local.")
 
 
-def _step(step: Step, wanted: set[str]) -> Iterator[Step]:
-    """A step differentiated, behind the step itself where it makes local arrays that are wanted."""
+def _derivative_steps(step: Step, reused: set[str]) -> Iterator[Step]:
+    """Derivative of a step, preceded by the step if it computes `wanted` local arrays."""
     if isinstance(step, Call):
-        if any(slot in wanted for _, slot in step.ports):
+        if any(slot in reused for _, slot in step.ports):
             yield step
         yield DifferentiatedCall(step.when, step.kernel + SLOPE, step.ports)
     elif isinstance(step, (Copy, Add)):
-        if step.to in wanted:
+        if step.to in reused:
             yield step
         yield replace(step, to=D + step.to, source=D + step.source if step.source else "")
     elif isinstance(step, (Gather, Evaluate)):
         yield step
         yield replace(step, to=D + step.to)
     elif isinstance(step, (ForEach, EachSpeed)):
-        yield replace(step, steps=tuple(part for s in step.steps for part in _step(s, wanted)))
+        yield replace(
+            step, steps=tuple(part for s in step.steps for part in _derivative_steps(s, reused))
+        )
     elif isinstance(step, RunPass):
         assert step.whole is not None
         yield replace(step, whole=differentiate_pass(step.whole))
@@ -83,19 +87,21 @@ def _step(step: Step, wanted: set[str]) -> Iterator[Step]:
 
 @dataclass(frozen=True)
 class DifferentiatedCall(Call):
-    """A call of a differentiated kernel: `ports` are those of the kernel itself, of which those in
-    `still` do not move."""
+    """Call of a differentiated kernel.
+
+    `ports` are those of the kernel itself; those in `still` have zero derivative.
+    """
 
     still: tuple[str, ...] = ()
 
 
 def differentiate_call(step: Call, *ports: str) -> DifferentiatedCall:
-    """The derivative of a call in which these ports do not move."""
+    """Derivative of a call in which these ports are constant."""
     return DifferentiatedCall(step.when, step.kernel + SLOPE, step.ports, still=ports)
 
 
 def ports_of(step: Call) -> dict[str, str]:
-    """port -> slot; a differentiated kernel has ports of derivatives besides."""
+    """port -> slot; for differentiated kernels with the ports of derivatives."""
     ports = dict(step.ports)
     if isinstance(step, DifferentiatedCall):
         ports |= {f"d_{port}": D + slot for port, slot in ports.items()}

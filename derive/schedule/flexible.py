@@ -1,4 +1,4 @@
-"""Flexible bodies: sections passed, modal rows made, condensed and recovered."""
+"""Flexible bodies: passing sections, modal rows, condensation and recovery."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ MODAL_OWN = Pass(
     ),
 )  # fmt: skip
 
-#: Modes eliminated from S and e of the body, before its hinge is passed.
+#: Elimination of modes from S and e of the body, before its hinge is passed.
 _CONDENSED = {"S_c": "local.S_c", "e_c": "local.e_c", "Gg": "modes.gain", "right": "modes.right"}
 MODAL_CONDENSE = Pass(
     "modal_condense", "body", "Modes eliminated from S and e of a flexible body.",
@@ -67,20 +67,20 @@ MODAL_CONDENSE = Pass(
     ),
 )  # fmt: skip
 
-#: What hangs on an end, seen by the modes of the body that it belongs to.
+#: Contribution of the bodies outboard of an end to the modes of the flexible body.
 ABSORBED = call(
     "modal.absorb", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
     U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f",
 )  # fmt: skip
 
-#: The modes' part of the deviation behind a section.
+#: Contribution of the modes to the deviation outboard of a section.
 DISPLACED = (
     call("modal.displaced", H="section.H", etadd="modes.etadd", delta_I="body.delta",
          delta="local.delta"),
     Copy(to="body.delta", source="local.delta"),
 )  # fmt: skip
 
-#: What is felt on a section, on the modes.
+#: Modal efforts of the load on a section.
 FELT = (
     call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.felt"),
     Copy(to="modes.e_f", source="modes.felt"),

@@ -1,4 +1,4 @@
-"""Root to tips: hinges, bias motion, own inertia and load of every body; poses where asked for."""
+"""Forward pass: hinge motion, bias motion, own inertia and load; poses if needed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .pass_steps import Add, ChooseBias, Copy, Pass, RunPass, call
 CONNECTION = {"Rt": "connection.R", "ro": "connection.r"}
 HINGE = {name: f"hinge.{name}" for name in ("R", "d", "H", "v", "w", "c")}
 BODY = {"Rc": "body.R", "r": "body.r", "motion": "body.motion"}
-#: What the kernel of a hinge without speeds gives that neither turns nor moves.
+#: Outputs of the kernel of a hinge without speeds: identity and zeros.
 STILL = {
     "R": "identity", "d": "zero", "H": "none", "v": "zero", "w": "zero", "c": "zero", "s": "none",
 }  # fmt: skip
@@ -58,7 +58,7 @@ FORWARD = Pass(
              motion="connection.motion"),
         call("generic{nu}.forward", when="staged", Rt="identity", ro="zero", **HINGE, s="body.s",
              motion_I="connection.motion", motion="body.motion"),
-        # The bias motion of what is refined is that of the answer.
+        # In a refinement the bias motion is that of the solution.
         ChooseBias(subspace="hinge.H", motion="body.motion", chosen="body.chosen",
                    when="staged !refined"),
         RunPass(whole=MODAL_OWN, when="modal"),

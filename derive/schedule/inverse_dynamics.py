@@ -1,4 +1,4 @@
-"""Inverse dynamics: the efforts that prescribed accelerations need, tips to root."""
+"""Inverse dynamics: efforts for given accelerations, backward pass."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from .flexible import FELT
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import TIPS_TO_ROOT, Copy, EachSpeed, Pass, RunPass, call, only
 
-#: What a load is felt as along the speeds of a hinge, and on the parent.
+#: Efforts of a load along the speeds of a hinge, and the load on the parent.
 FELT_ON_THE_WAY = (
     call("generic{nu}.effort", H="hinge.H", f="body.e", tau="local.tau"),
     EachSpeed(

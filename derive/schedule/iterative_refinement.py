@@ -1,7 +1,8 @@
-"""An answer refined: its accelerations are the bias motion, and what they leave over is answered.
+"""Iterative refinement: a second solution for the residual of the first.
 
-That is inverse dynamics of the answer, which eliminates nothing, as right-hand side of the same
-sweep: heavy bodies behind light ones cost digits of the change alone.
+The accelerations of the first solution are the bias motion.  Their inverse dynamics, which
+eliminates nothing, is the right-hand side of the same sweep: large mass ratios then only affect the
+digits of the correction.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ RESTATED = Pass(
                 Add(to="body.tau[k]", source="local.lack", times=-1),
             ),
         ),
-        # Nobody asks them of speeds that are imposed.
+        # Prescribed speeds have no equation.
         EachSpeed(
             steps=(
                 call("frames.driven_effort", felt="zero", J="body.rotor[k]", udot="body.s[k]",
@@ -34,5 +35,5 @@ RESTATED = Pass(
     skip="cut",
 )  # fmt: skip
 
-#: Of a tree, in which nothing is cut.
+#: For trees without cut hinges.
 RESTATED_OF_TREE = replace(RESTATED, name="restated_of_tree", skip="")

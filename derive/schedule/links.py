@@ -1,8 +1,8 @@
-"""Links: a rigid body behind a hinge that moves about and along z, or turns about a point, one
-kernel a pass.
+"""Links: rigid bodies outboard of an axial or ball-like hinge, one kernel per pass.
 
-Bodies in a row that are links are swept without touching their blocks: between the passes there is
-no more in memory than the next pass reads, and S and e stay at hand from link to link.
+The hinge moves about and along z, or rotates about a point.  Consecutive links are swept without
+their workspace blocks: only what the next pass reads is stored, and S and e stay in registers or
+local arrays from link to link.
 """
 
 from __future__ import annotations

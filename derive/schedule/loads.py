@@ -1,4 +1,4 @@
-"""What acts: efforts and laws on speeds, loads and force elements on bodies, and their power."""
+"""Efforts and laws on speeds, loads and force elements on bodies, and their power."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Closed loops: rows of the hinges that close them, carried as columns through the sweep.
+"""Closed loops: rows of cut hinges, carried as columns through the sweep.
 
-In place of `condense` and `recover` the elimination of a hinge is kept, as for several right-hand
-sides, and the columns of the rows that are open yet follow the load across it; in code for one
-scene stage by stage, as the load does there.  See derive/equations/loop_closure.py.
+Instead of `condense` and `recover` the factors of each elimination are kept, as for several
+right-hand sides, and the columns of open rows follow the load across the hinge; in code for one
+scene stage by stage, as for the load.  See derive/equations/loop_closure.py.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ _MEETING = (
     call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
          w_B="outboard.w", slip="closure.slip"),
 )  # fmt: skip
-#: A constraint has directions and a gap of its own.
+#: A constraint defines its own directions and gap.
 _CONSTRAINED = (
     call("loops.distance", when="distance", p="closure.p", d="closure.d", **_OWN),
     call("loops.plane", when="plane", p="closure.p", d="closure.d", **_OWN),
@@ -75,16 +75,16 @@ _CONSTRAINED = (
 )  # fmt: skip
 _DRIFT = call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
               motion_B="outboard.motion", drift="local.drift")  # fmt: skip
-#: Or, where steps close gaps by their accelerations:
+#: Alternative for steps that close gaps by accelerations.
 _CLOSING = call("loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative")
-#: And directions that turn.
+#: Terms of rotating directions.
 _BENT = (
     call("loops.distance_drift", when="distance", d="closure.d", slip="closure.slip",
          drift="local.drift"),
     call("loops.rolling_drift", when="rolling", p="closure.p", R_C="closure.R_C",
          slip="closure.slip", drift="local.drift"),
 )  # fmt: skip
-#: The load of the hinge's laws, along its own directions.
+#: Load of the hinge's laws along its directions.
 _EFFORTS = EachSpeed(
     steps=(
         _row("k"),
@@ -113,7 +113,7 @@ CLOSURES = Pass(
                 Move(to="side.inner", source="closure.J_A[6 * c]", count="6"),
                 Move(to="side.outer", source="closure.J_B[6 * c]", count="6"),
                 Move(to="line.known", source="closure.l[c]", count="1"),
-                # A rotor resists a correction, but asks for none.
+                # Rotor inertia enters a correction but has no error of its own.
                 Copy(to="line.known", when="corrected soft"),
                 *only(
                     "refined",
@@ -130,7 +130,7 @@ CLOSURES = Pass(
     skip="!cut",
 )  # fmt: skip
 
-#: Multipliers are known here, from an evaluation of accelerations in the same workspace.
+#: Multipliers are known from an earlier evaluation of accelerations in this workspace.
 CLOSURES_LOADED = Pass(
     "closures_loaded", "body", "Rows of a hinge that closes a loop, and all the load that it puts"
     " on its bodies.",
@@ -204,7 +204,7 @@ UNLOADED = Pass(
     (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),
 )  # fmt: skip
 
-#: Modes eliminated from the rows that pass or end at a flexible body, behind S and e.
+#: Elimination of modes from rows that pass or end at a flexible body, after S and e.
 _ROWS_CONDENSED = ForEach(
     of="bent",
     steps=(
@@ -232,7 +232,7 @@ _MODES_ANSWERED = (
 
 _ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}
 
-#: How a row's column, moved by the hinge, is coupled with the load and with other columns.
+#: Coupling of a row's column with the load and with other columns at the hinge.
 _COUPLED = only(
     "moving",
     call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
@@ -244,24 +244,24 @@ _COUPLED = only(
 )
 
 
-def _felt(load: str, effort: str, rest: str) -> Call:
-    """What is left of an effort by a load, where the hinge's speeds are eliminated."""
+def _effort_remainder(load: str, effort: str, remainder: str) -> Call:
+    """Remainder of an effort after a load, where the hinge's speeds are eliminated."""
     return call("generic{free}.push", when="moving", Rc="identity", r="zero", H="hinge.H_free",
-                G="zero", e=load, tau=effort, y=rest)  # fmt: skip
+                G="zero", e=load, tau=effort, y=remainder)  # fmt: skip
 
 
-def _pushed(when: str, load: str, effort: str, rest: str, onward: str) -> tuple[Call, ...]:
-    """A load carried on, or felt alone by a hinge on the ground, which takes what comes."""
-    felt = {"e": load, "tau": effort, "y": rest}
+def _carry_load(when: str, load: str, effort: str, remainder: str, onward: str) -> tuple[Call, ...]:
+    """Load carried to the parent; a hinge on the ground only computes its efforts."""
+    ports = {"e": load, "tau": effort, "y": remainder}
     return (
-        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_ACROSS, **felt,
+        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_ACROSS, **ports,
              e_I=onward),
         call("generic{free}.push_on_ground", when=f"{when} moving !hung".strip(),
-             H="hinge.H_free", **felt),
+             H="hinge.H_free", **ports),
     )  # fmt: skip
 
 
-#: A column at an end of a flexible body is felt by its modes.
+#: Modal part of a column at an end of a flexible body.
 _FELT_BY_MODES = call("modal.row_felt", when="outward", H="section.H", K="pending.K",
                       K_f="pending.modes")  # fmt: skip
 
@@ -270,16 +270,16 @@ _ALONE = only(
     call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
          J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
          G="hinge.G", S_I="parent.S"),
-    *_pushed("", "body.e", "hinge.tau_free", "hinge.g", "parent.e"),
+    *_carry_load("", "body.e", "hinge.tau_free", "hinge.g", "parent.e"),
     ForEach(
         of="pending",
         steps=(
             _FELT_BY_MODES,
-            *_pushed("!coupled", "pending.K", "zero", "pending.y", "pending.onward"),
+            *_carry_load("!coupled", "pending.K", "zero", "pending.y", "pending.onward"),
             *only(
                 "coupled",
                 SelectColumns(to="local.tau", source="pending.tau"),
-                *_pushed("", "pending.K", "local.tau", "pending.y", "pending.onward"),
+                *_carry_load("", "pending.K", "local.tau", "pending.y", "pending.onward"),
                 replace(TOLD, when=""),
             ),
             *_COUPLED,
@@ -289,7 +289,7 @@ _ALONE = only(
 _BY_STAGES = only(
     "staged",
     *condensed("body.e"),
-    _felt("local.e", "hinge.tau_free", "hinge.g"),
+    _effort_remainder("local.e", "hinge.tau_free", "hinge.g"),
     *eliminate_with_effort("hinge.tau_free", "hinge.z"),
     JUDGED,
     *ONWARD,
@@ -301,13 +301,13 @@ _BY_STAGES = only(
             *condensed("pending.K"),
             *only(
                 "!coupled",
-                _felt("local.e", "zero", "pending.y"),
+                _effort_remainder("local.e", "zero", "pending.y"),
                 *eliminate_with_effort("zero", "pending.z"),
             ),
             *only(
                 "coupled",
                 SelectColumns(to="local.tau", source="pending.tau"),
-                _felt("local.e", "local.tau", "pending.y"),
+                _effort_remainder("local.e", "local.tau", "pending.y"),
                 *eliminate_with_effort("local.tau", "pending.z"),
                 replace(TOLD, when=""),
                 replace(TOLD_OF_BIAS, when="!corrected"),
@@ -336,8 +336,8 @@ CARRIED = Pass(
 )  # fmt: skip
 
 
-def _pulled(column: str, offset: str) -> ForEach:
-    """Efforts that the multipliers of open rows add."""
+def _multiplier_efforts(column: str, offset: str) -> ForEach:
+    """Efforts from the multipliers of open rows."""
     return ForEach(
         of="pending",
         steps=(
@@ -352,11 +352,11 @@ ANSWERED = Pass(
     (
         *only(
             "!staged",
-            _pulled("pending.y", "hinge.g"),
+            _multiplier_efforts("pending.y", "hinge.g"),
             call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
                  delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
-        *only("staged", _pulled("pending.z", "hinge.z"), *RECOVERED),
+        *only("staged", _multiplier_efforts("pending.z", "hinge.z"), *RECOVERED),
         efforts_of("pending.x", "kept"),
         ScatterSpeeds(to="body.udot", free="hinge.rates", imposed="body.s", when="!refined"),
         *only(
@@ -368,7 +368,7 @@ ANSWERED = Pass(
         ForEach(of="openings", steps=(RunPass(whole=ROW_FOUND),)),
         *only("modal", *_MODES_ANSWERED),
         *only("section", *DISPLACED),
-        # The elimination lay where H was.
+        # The elimination has overwritten H.
         RunPass(whole=HINGE_MOTION, when="!staged imposed balance"),
     ),
     skip="aside",
@@ -392,7 +392,7 @@ CLOSURES_ANSWERED = Pass(
             "kept",
             efforts_of_own("own.x", ""),
             Copy(to="body.e"),
-            Copy(to="body.delta", when="staged"),  # what has no mass asks for none
+            Copy(to="body.delta", when="staged"),  # a massless frame has no deviation
             EachSpeed(
                 steps=(call("loops.loaded", K="closure.W[6 * k]", x="body.tau[k]", e="body.e"),),
             ),

@@ -1,8 +1,8 @@
-"""The mass matrix: inertia of all that hangs on a hinge, and what its acceleration asks of others.
+"""Mass matrix: composite inertia outboard of each hinge, and its load on other hinges.
 
-With every hinge held, S of what is outboard is carried to the parent as it is.  One speed of a
-hinge that changes at 1 a second then asks for the load S H there, which the hinges on the way to
-the root feel, and no other.
+With all hinges locked, S of the outboard bodies is carried to the parent unchanged.  Unit
+acceleration of one speed of a hinge requires the load S H there, which only the hinges on the path
+to the root resist.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""M^-1 times columns: S factored once, then one load from tips to root and back for each column."""
+"""M^-1 times columns: S is factored once, then one backward and forward pass per column."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ FACTORISE = Pass(
     "factorise", "body", "Mass matrices carried to the root; what each elimination leaves is kept.",
     (
         RunPass(whole=HINGE_MOTION, when="own"),
-        # Loads are carried along unread: columns start from none.
+        # Loads are carried but not read: each column starts from zero load.
         RunPass(whole=MODAL_CONDENSE, when="modal"),
         *only("outward", ABSORBED),
         *FREE,

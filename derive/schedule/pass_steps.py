@@ -1,7 +1,7 @@
-"""What a pass is made of: calls of kernels over named slots, and the little that moves numbers.
+"""Steps of passes: kernel calls on named slots, and copies of numbers.
 
-A step is done where its condition `when` holds: traits separated by spaces, all of which must hold;
-"!" before a trait asks for its absence.  Traits and slots are explained in `words`.
+A step is executed if its condition `when` holds: traits separated by spaces, all of which must
+hold; "!" negates a trait.  Traits and slots are defined in `slot_definitions`.
 """
 
 from __future__ import annotations
@@ -9,32 +9,32 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-#: Orders in which a pass meets what it is for.
+#: Orders in which a pass visits its subjects.
 ROOT_TO_TIPS, TIPS_TO_ROOT = "root to tips", "tips to root"
-#: Fields of what moves numbers that name slots.
-_NAMED = ("to", "source", "free", "imposed")
+#: Fields of copying steps that name slots.
+_SLOT_FIELDS = ("to", "source", "free", "imposed")
 
 
 @dataclass(frozen=True)
 class Step:
-    """Anything a pass does."""
+    """Base class of steps."""
 
     when: str = ""
 
     @property
     def traits(self) -> tuple[tuple[str, bool], ...]:
-        """(trait, whether it must hold) of the condition."""
+        """(trait, required value) of each part of the condition."""
         return tuple((word.lstrip("!"), not word.startswith("!")) for word in self.when.split())
 
 
 @dataclass(frozen=True)
 class Call(Step):
-    """A kernel over slots.
+    """Kernel call on slots.
 
-    `kernel` is "element.kernel"; "generic{nu}" and "generic{free}" stand for the steps for any
-    hinge with so many speeds, "hinge", "body", "law", "force" and "link" for the element that is
-    there.  `ports` are (port, slot); outputs that nobody wants are left out.  A guard that does not
-    hold ends the sweep with the reason `fails`; without one no guard can fail.
+    `kernel` is "element.kernel"; "generic{nu}" and "generic{free}" stand for the generic steps
+    with that number of speeds, "hinge", "body", "law", "force" and "link" for the current
+    element.  `ports` are (port, slot); unused outputs are left out.  A failing guard ends the
+    sweep with the reason `fails`; without `fails` no guard can fail.
     """
 
     kernel: str = ""
@@ -61,8 +61,11 @@ class Add(Step):
 
 @dataclass(frozen=True)
 class SelectColumns(Step):
-    """to = the columns of `source` (rows x nu) that belong to free speeds; rows = 0: of a row for
-    each speed those of free speeds, too."""
+    """to = the columns of `source` (rows x nu) of free speeds.
+
+    With rows = 0, `source` has one row per speed, and only rows of free speeds are copied as
+    well.
+    """
 
     to: str = ""
     source: str = ""
@@ -71,7 +74,7 @@ class SelectColumns(Step):
 
 @dataclass(frozen=True)
 class ScatterSpeeds(Step):
-    """to[k] = free[...] for the free speeds, imposed[k] for the others."""
+    """to[k] = next entry of `free` for free speeds, imposed[k] for the others."""
 
     to: str = ""
     free: str = ""
@@ -80,7 +83,7 @@ class ScatterSpeeds(Step):
 
 @dataclass(frozen=True)
 class Gather(Step):
-    """to = those of the scene's expression values that `places` names; none is zero."""
+    """to = the scene's expression values with the indices `places`; zero without an index."""
 
     to: str = ""
     places: str = ""
@@ -88,7 +91,7 @@ class Gather(Step):
 
 @dataclass(frozen=True)
 class Evaluate(Step):
-    """to = value of an expression of the scene, which may read `given` (port, slot)."""
+    """to = value of an expression of the scene with the inputs `given` (port, slot)."""
 
     to: str = ""
     expression: str = ""
@@ -97,7 +100,7 @@ class Evaluate(Step):
 
 @dataclass(frozen=True)
 class EachSpeed(Step):
-    """Steps for every speed k of a hinge, or for every imposed one; "[k]" marks its entry."""
+    """Steps for every speed k of a hinge, or every prescribed one; "[k]" is its entry."""
 
     steps: tuple[Step, ...] = ()
     imposed: bool = False
@@ -105,8 +108,7 @@ class EachSpeed(Step):
 
 @dataclass(frozen=True)
 class Move(Step):
-    """count numbers of `source` to `to`; "[width * c]" is the row of a direction
-    (`ForEachDirection`)."""
+    """Copy `count` numbers of `source` to `to`; "[width * c]" is the row of direction c."""
 
     to: str = ""
     source: str = ""
@@ -115,13 +117,13 @@ class Move(Step):
 
 @dataclass(frozen=True)
 class ForEachDirection(Step):
-    """Steps for every direction of a body, or of the body that a law is about; the derivatives that
-    they read have been pointed along it: direction number c of
+    """Steps for every direction c of a body, or of the body that a law belongs to.
 
-    `of`: "free", the unknowns of a hinge; "felt", those that a law feels; "rates", its speeds
-    alone; "coordinates", its coordinates alone; "modes", the unknowns of a flexible body; "motion",
-    the nine numbers of a motion, "spin" the first three; "place", the nine of a change of place,
-    "turn" the first three; "law", the unknowns that go with the speeds that a law acts on.
+    The derivatives that the steps read are seeded along the direction.  `of`: "free", the
+    unknowns of a hinge; "felt", those that affect a law; "rates", only its speeds;
+    "coordinates", only its coordinates; "modes", the unknowns of a flexible body; "motion", the
+    nine numbers of a motion, "spin" the first three; "place", the nine of a displacement,
+    "turn" the first three; "law", the unknowns of the speeds that a law acts on.
     """
 
     of: str = ""
@@ -130,15 +132,14 @@ class ForEachDirection(Step):
 
 @dataclass(frozen=True)
 class ForEach(Step):
-    """Steps for each of
+    """Steps for every constraint row of a set.
 
-    `of`: "closings", the rows that close on a body, where the passes done are those of rows, and
-    "openings", the same the other way round; "pending", the rows whose columns go across its hinge;
-    "before", those of them up to the one at hand; "bent", the rows that ends of a flexible body
-    bring, "bent_before" likewise; "rows", the rows of a hinge that closes a loop,
-    each in direction number c; "own", the rows of couplings of such a hinge; "others", the rows
-    that a row is coupled with when it closes;
-    "seconds", those of them up to the one at hand.
+    `of`: "closings", the rows that close on a body, for passes over rows, and "openings", the
+    same in reverse order; "pending", the rows whose columns cross its hinge; "before", those up
+    to the current one; "bent", the rows at ends of a flexible body, "bent_before" those up to
+    the current one; "rows", the rows of a hinge that closes a loop, each in direction c; "own",
+    the rows of couplings of such a hinge; "others", the rows coupled with a closing row;
+    "seconds", those up to the current one.
     """
 
     of: str = ""
@@ -147,10 +148,10 @@ class ForEach(Step):
 
 @dataclass(frozen=True)
 class ByScrew(Step):
-    """Steps chosen by what is known of a rotation and a position when code is made for a scene.
+    """Steps selected by the structure of a rotation and a position, when a scene is fused.
 
-    `about_x`, `about_z`: a screw about that axis.  `turning`: a rotation of which nothing is known.
-    `otherwise`: what is left, whose zeros fold.
+    `about_x`, `about_z`: a screw about that axis.  `turning`: a general rotation.  `otherwise`:
+    the rest, whose zeros fold.
     """
 
     rotation: str = ""
@@ -163,8 +164,11 @@ class ByScrew(Step):
 
 @dataclass(frozen=True)
 class ChooseBias(Step):
-    """Along every free unit direction of H the bias motion is stopped by the speed's own
-    acceleration (`chosen`): deviations from it are recovered whatever it is, and zeros fold."""
+    """Cancel the bias motion along free unit directions of H by the speeds' accelerations.
+
+    These accelerations are stored in `chosen`; deviations from them are recovered later, and
+    zeros fold.
+    """
 
     subspace: str = ""
     motion: str = ""
@@ -173,8 +177,10 @@ class ChooseBias(Step):
 
 @dataclass(frozen=True)
 class CheckPivots(Step):
-    """Every diagonal entry of D against the mean inertia of the body itself, where the kernel that
-    eliminates asks for no more than a positive one."""
+    """Compare each diagonal entry of D with the mean inertia of the body.
+
+    The elimination kernel itself only requires a positive pivot.
+    """
 
     pivots: str = ""
     subspace: str = ""
@@ -185,12 +191,12 @@ class CheckPivots(Step):
 
 @dataclass(frozen=True)
 class Pass:
-    """What is done with every body (law, load, ...) in turn.
+    """Steps executed for every body (law, load, ...).
 
-    `subject` names what is met, `order` how; `skip` is the condition under which one is passed by.
-    `given` are slots that the caller hands over instead of reading them where they usually lie;
-    where `spares_links` holds, bodies that are swept as links have no part in it.  A `flat` one is
-    of a scene in a plane, and of the little that the looped engine keeps of its bodies.
+    `subject` is the kind of item visited, `order` the order; `skip` is the condition under
+    which an item is skipped.  `given` are slots passed by the caller instead of read from
+    storage; if `spares_links` holds, bodies that are swept as links are skipped.  A `flat` pass
+    belongs to planar scenes, with the reduced storage of their bodies.
     """
 
     name: str
@@ -206,14 +212,14 @@ class Pass:
 
 @dataclass(frozen=True)
 class RunPass(Step):
-    """All steps of another pass, for the same body."""
+    """Run all steps of another pass for the same body."""
 
     whole: Pass | None = None
 
 
 @dataclass(frozen=True)
 class Run(Step):
-    """A pass over all its subjects, or (`hook`) a piece of the looped engine's own."""
+    """Run a pass over all its subjects, or a hook of the looped engine."""
 
     whole: Pass | None = None
     hook: str = ""
@@ -221,7 +227,7 @@ class Run(Step):
 
 @dataclass(frozen=True)
 class Sweep:
-    """Passes one after the other, and what comes out of them."""
+    """Sequence of passes, and its purpose."""
 
     name: str
     purpose: str
@@ -229,17 +235,17 @@ class Sweep:
 
 
 def call(kernel: str, when: str = "", fails: str = "", **ports: str) -> Call:
-    """A call by the names of its ports."""
+    """Kernel call with slots by port names."""
     return Call(when, kernel, tuple(ports.items()), fails)
 
 
 def only(when: str, *steps: Step) -> tuple[Step, ...]:
-    """Steps under one more condition."""
+    """Steps with an additional condition."""
     return tuple(replace(step, when=f"{when} {step.when}".strip()) for step in steps)
 
 
 def inner(step: Step) -> Iterator[Step]:
-    """The step and every step inside it."""
+    """The step and all steps inside it."""
     yield step
     parts: tuple[Step, ...] = ()
     if isinstance(step, (EachSpeed, ForEachDirection, ForEach)):
@@ -253,7 +259,7 @@ def inner(step: Step) -> Iterator[Step]:
 
 
 def elsewhere(whole: Pass, name: str, slots: Mapping[str, str]) -> Pass:
-    """The same steps over other slots; `name` goes before the pass's own."""
+    """Pass with the same steps on other slots; `name` is prefixed to its name."""
 
     def renamed(step: Step) -> Step:
         if isinstance(step, RunPass):
@@ -262,7 +268,9 @@ def elsewhere(whole: Pass, name: str, slots: Mapping[str, str]) -> Pass:
         if isinstance(step, Call):
             ports = ((port, slots.get(slot, slot)) for port, slot in step.ports)
             return replace(step, ports=tuple(ports))
-        found = {key: slots.get(slot, slot) for key, slot in vars(step).items() if key in _NAMED}
-        return replace(step, **found)
+        fields = {
+            key: slots.get(slot, slot) for key, slot in vars(step).items() if key in _SLOT_FIELDS
+        }
+        return replace(step, **fields)
 
     return replace(whole, name=f"{name}_{whole.name}", steps=tuple(map(renamed, whole.steps)))

@@ -1,8 +1,7 @@
-"""Passes in a plane: of scenes with closed loops where every hinge is a free pin and all pins are
-parallel.
+"""Passes for planar scenes with closed loops, in which all hinges are free, parallel pins.
 
-What such a scene has is known beforehand: steps whose conditions do not hold go, and conditions
-that do.  Kernels are those in a plane, where there are such.
+The traits of such a scene are known in advance: steps with false conditions and true conditions are
+removed.  Planar kernels are used where they exist.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ from .pass_steps import (
     Sweep,
 )
 
-#: Entries of a load or a direction that lie in the plane.
+#: In-plane entries of a load or a direction.
 LOAD = (0, 1, 5)
-#: What holds of such a scene, and of evaluations of accelerations that nobody observes.
-_HOLDS = {
+#: Traits of such a scene, and of unobserved evaluations of accelerations.
+_TRAITS = {
     **dict.fromkeys(("own", "free", "moving", "hinged", "known", "posed", "looped"), True),
     **dict.fromkeys(
         ("parts", "whole", "staged", "section", "outward", "modal", "imposed", "distance", "plane",
@@ -38,9 +37,9 @@ _HOLDS = {
          "couplings", "product", "qr"), False,
     ),
 }  # fmt: skip
-#: What could be met one by one, and is not there.
-_NONE = ("own", "bent")
-#: Kernels that there are in a plane.
+#: Loops that are empty in such a scene.
+_EMPTY_LOOPS = ("own", "bent")
+#: Kernels with a planar form.
 _KERNELS = {
     "hinge.forward", "body.inertia", "body.bias_load",
     *(f"frames.{name}" for name in (
@@ -53,98 +52,101 @@ _KERNELS = {
         "meet", "slip", "drift", "row", "known", "told", "act", "close", "shed", "multiplier_more",
     )),
 }  # fmt: skip
-#: What nobody asks of the frame of a hinge that closes a loop.
-_OF_MASS = {"body.inertia", "body.bias_load"}
-#: Slots of the free speeds -> those of all speeds; rows of a hinge -> where they are carried from;
-#: what is the same in every position -> where it is given.
+#: Kernels of inertia, skipped for the massless frame of a cut hinge.
+_INERTIA_KERNELS = {"body.inertia", "body.bias_load"}
+#: Slots of free speeds -> slots of all speeds; rows of a hinge -> slots of the carried columns;
+#: constant data -> where it is stored.
 _SLOTS = {
     "hinge.J_free": "body.rotor", "hinge.tau_free": "body.tau", "hinge.rates": "body.udot",
     "closure.J_A[6 * c]": "side.inner", "closure.J_B[6 * c]": "side.outer",
     "closure.W": "plane", "closure.W[6 * k]": "plane", "closure.W[6 * c]": "plane[3 * c]",
     "body.r": "connection.r", "hinge.p": "none",
 }  # fmt: skip
-#: What no later pass reads.
-_PASSING = {f"closure.{name}": f"local.{name}" for name in ("R_C", "lever", "d", "slip")}
-#: Ports of what is the same for all pins, or zero.
-_SAME = {
+#: Slots that no later pass reads.
+_LOCAL_SLOTS = {f"closure.{name}": f"local.{name}" for name in ("R_C", "lever", "d", "slip")}
+#: Ports that are constant for all pins, or zero.
+_CONSTANT_PORTS = {
     ("H", "hinge.H_free"), ("H", "hinge.H"), ("v_rel", "hinge.v"), ("W", "zero"),
     ("s", "body.s"), ("delta", "zero"), ("gravity", "zero"),
 }  # fmt: skip
-#: What a plane has no need to write: it stands in its records.
-_WRITTEN = {"generic{nu}.complement", "frames.pivot_floor"}
-#: Nobody asks rows for more than the bodies' own motions do.
-_UNASKED = {"rows_asked"}
-#: A pin prescribes nothing.
-_NOTHING = "body.s"
+#: Slots that planar scenes read from records instead of writing them.
+_OMITTED_KERNELS = {"generic{nu}.complement", "frames.pivot_floor"}
+#: Rows have no target beyond the bodies' motion.
+_OMITTED_HOOKS = {"rows_asked"}
+#: A pin has no prescribed motion.
+_ZERO_SLOT = "body.s"
 
 
 def sweep_in_plane(whole: Sweep) -> Sweep:
-    """The sweep for scenes in a plane.  Loops are closed as soon as the bodies are known that they
-    close on, before anything else acts on these."""
-    runs = [run for run in _steps(whole.runs) if isinstance(run, Run) and _has_part(run)]
-    begun, closed = _taken(runs, "rows_begun"), _taken(runs, "closures_in_plane")
-    acting = next(k for k, run in enumerate(runs) if run.whole and run.whole.subject == "load")
-    found = (begun, *runs[:acting], closed, *runs[acting:])
-    return replace(whole, name=f"{whole.name}_in_plane", runs=found)
+    """Sweep for planar scenes.
+
+    Loops are closed as soon as both bodies of a cut hinge are known, before other loads act on
+    them.
+    """
+    runs = [run for run in _planar_steps(whole.runs) if isinstance(run, Run) and _is_needed(run)]
+    start, closures = _remove_run(runs, "rows_begun"), _remove_run(runs, "closures_in_plane")
+    first_load = next(k for k, run in enumerate(runs) if run.whole and run.whole.subject == "load")
+    runs_in_order = (start, *runs[:first_load], closures, *runs[first_load:])
+    return replace(whole, name=f"{whole.name}_in_plane", runs=runs_in_order)
 
 
-def _has_part(run: Run) -> bool:
-    return bool(run.whole.steps) if run.whole else run.hook not in _UNASKED
+def _is_needed(run: Run) -> bool:
+    return bool(run.whole.steps) if run.whole else run.hook not in _OMITTED_HOOKS
 
 
-def _taken(runs: list[Run], name: str) -> Run:
-    """The run of this name, which is none of the others from now on."""
+def _remove_run(runs: list[Run], name: str) -> Run:
+    """Remove the run with this name from the list and return it."""
     at = [run.whole.name if run.whole else run.hook for run in runs].index(name)
     return runs.pop(at)
 
 
-def _in_plane(whole: Pass) -> Pass:
-    """The pass for scenes in a plane, whose closed loops are met one by one."""
+def _planar_pass(whole: Pass) -> Pass:
+    """Pass for planar scenes, visiting closed loops one by one."""
     spares = "" if "linked" in whole.spares_links.split() else whole.spares_links
     subject, skip = ("closure", "") if whole.skip == "!cut" else (whole.subject, whole.skip)
     return replace(
         whole, name=f"{whole.name}_in_plane", subject=subject, skip=skip, given=(), flat=True,
-        steps=tuple(_steps(whole.steps)), spares_links=spares,
+        steps=tuple(_planar_steps(whole.steps)), spares_links=spares,
     )  # fmt: skip
 
 
-def _steps(steps: tuple[Step, ...]) -> Iterator[Step]:
+def _planar_steps(steps: tuple[Step, ...]) -> Iterator[Step]:
     for step in steps:
-        if any(_HOLDS.get(trait, wanted) != wanted for trait, wanted in step.traits):
+        if any(_TRAITS.get(trait, required) != required for trait, required in step.traits):
             continue
         if isinstance(step, (SelectColumns, ScatterSpeeds)) or (
-            isinstance(step, ForEach) and step.of in _NONE
+            isinstance(step, ForEach) and step.of in _EMPTY_LOOPS
         ):
             continue
-        if isinstance(step, Call) and step.kernel in _WRITTEN:
+        if isinstance(step, Call) and step.kernel in _OMITTED_KERNELS:
             continue
-        if isinstance(step, Copy) and step.to == _NOTHING:
+        if isinstance(step, Copy) and step.to == _ZERO_SLOT:
             continue
         if isinstance(step, Move) and _SLOTS.get(step.source) == step.to:
             continue
         if isinstance(step, EachSpeed):
-            yield from map(_of_the_speed, _steps(step.steps))
+            yield from map(_unroll_speed, _planar_steps(step.steps))
             continue
-        left = [word for word in step.when.split() if word.lstrip("!") not in _HOLDS]
-        if isinstance(step, Call) and step.kernel in _OF_MASS:
-            left.append("!aside")
-        yield _replaced(replace(step, when=" ".join(left)))
+        remaining = [word for word in step.when.split() if word.lstrip("!") not in _TRAITS]
+        if isinstance(step, Call) and step.kernel in _INERTIA_KERNELS:
+            remaining.append("!aside")
+        yield _planar_step(replace(step, when=" ".join(remaining)))
 
 
-def _replaced(step: Step) -> Step:
+def _planar_step(step: Step) -> Step:
     if isinstance(step, (RunPass, Run)) and step.whole is not None:
-        return replace(step, whole=_in_plane(step.whole))
+        return replace(step, whole=_planar_pass(step.whole))
     if isinstance(step, ForEach):
-        return replace(step, steps=tuple(_steps(step.steps)))
-    if isinstance(step, Copy) and step.source == _NOTHING:
+        return replace(step, steps=tuple(_planar_steps(step.steps)))
+    if isinstance(step, Copy) and step.source == _ZERO_SLOT:
         return replace(step, source="")
     if isinstance(step, Call) and step.kernel in _KERNELS:
-        return _in_plane_called(step)
+        return _planar_call(step)
     return step
 
 
-def _of_the_speed(step: Step) -> Step:
-    """A step for every speed, of which a pin has one."""
+def _unroll_speed(step: Step) -> Step:
+    """Unrolled step over the single speed of a pin."""
     if isinstance(step, Add):
         return replace(step, to=step.to.replace("[k]", "[0]"))
     assert isinstance(step, Call)
@@ -152,11 +154,11 @@ def _of_the_speed(step: Step) -> Step:
     return replace(step, ports=ports)
 
 
-def _in_plane_called(step: Call) -> Call:
+def _planar_call(step: Call) -> Call:
     kernel = step.kernel.partition(".")[2]
     ports = tuple(
-        (port, _SLOTS.get(slot, _PASSING.get(slot, slot)))
+        (port, _SLOTS.get(slot, _LOCAL_SLOTS.get(slot, slot)))
         for port, slot in step.ports
-        if (port, slot) not in _SAME and (kernel, port) != ("forward", "r")
+        if (port, slot) not in _CONSTANT_PORTS and (kernel, port) != ("forward", "r")
     )
     return replace(step, kernel=f"planar.{kernel}", ports=ports)

@@ -1,8 +1,8 @@
-"""Loads that change with the place of their body, in the tangent (derive/equations/tangent_placed).
+"""Position-dependent loads in the tangent (derive/equations/tangent_position_loads).
 
-These steps go between those of `tangent`, for every body that leads to such a load: one in the axes
-of space, a force element to the ground, drag.  The rows that a load's body starts from come of the
-differentiated passes of the loads themselves, along every entry of the body's place.
+These steps extend those of the tangent sweep, for every body inboard of such a load: a load in
+inertial axes, a force element to the ground, drag.  The initial rows come from the differentiated
+passes of the loads themselves, along every entry of the body's position.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ _POSED = call("frames.placed_pose", A="body.A", p="place.z", d_A=D + "body.A", d
               d_v=D + "body.v")  # fmt: skip
 _STILL = (Copy(to=D + "body.A"), Copy(to=D + "body.x"), Copy(to=D + "body.v"))
 
-#: Nothing moves yet, and nothing is known of loads by place.
+#: Zero displacement, and no known load by position.
 BEGUN = only("placed", Copy(to="place.S"), *_STILL, Copy(to=D + "body.motion"))
 
 
-def _added(to: str, *steps: Step) -> tuple[Step, ...]:
-    """What steps add to the body's load along direction c, in a row for it."""
+def _accumulate_rows(to: str, *steps: Step) -> tuple[Step, ...]:
+    """Load that `steps` add to the body along direction c, stored in row c of `to`."""
     return (
         Move(to=D + "body.e", source=f"{to}[6 * c]", count="6"),
         *steps,
@@ -44,17 +44,17 @@ def _added(to: str, *steps: Step) -> tuple[Step, ...]:
     )
 
 
-def _along(entries: str, *steps: Step) -> tuple[Step, ...]:
-    """Steps for entries of the body's place, which stays as it is behind them."""
+def _along_position(entries: str, *steps: Step) -> tuple[Step, ...]:
+    """Steps for entries of the body's position, whose seed is cleared afterwards."""
     return (ForEachDirection(of=entries, steps=(_POSED, *steps)), *_STILL)
 
 
-#: Drag by motion and modes joins the body's own load.
+#: Drag by motion and modes is added to the body's own load.
 DRAGGED = RunPass(whole=differentiate_pass(DRAG), when="drag")
-#: Drag along the place of a flexible body, zero without.
+#: Drag along the position of a flexible body; zero without drag.
 OWN_BY_PLACE = only(
     "modal placed",
-    *_along(
+    *_along_position(
         "place",
         Copy(to=D + "body.e"),
         Copy(to=D + "modes.e_f"),
@@ -68,28 +68,30 @@ _APPLIED = next(
     step for step in LOADS.steps
     if isinstance(step, Call) and step.kernel == "frames.applied_load"
 )  # fmt: skip
-#: What makes the numbers that it is applied with.
-_TAKEN = LOADS.steps[: LOADS.steps.index(_APPLIED)]
+#: Steps that compute the inputs of its application.
+_LOAD_INPUTS = LOADS.steps[: LOADS.steps.index(_APPLIED)]
 
 LOADS_BY_PLACE = Pass(
     "loads_by_place", "load", "Change of a load in the axes of space as its body turns.",
     (
-        *_TAKEN,
-        *_along("turn", *_added("place.S", differentiate_call(_APPLIED, "A_F", "F", "M"))),
+        *_LOAD_INPUTS,
+        *_along_position(
+            "turn", *_accumulate_rows("place.S", differentiate_call(_APPLIED, "A_F", "F", "M"))
+        ),
     ),
     skip="!own_load",
 )  # fmt: skip
 
 
-def _moves(step: Step) -> bool:
-    """Whether a step of a differentiated pass makes a derivative."""
+def _computes_derivative(step: Step) -> bool:
+    """Whether a step of a differentiated pass computes a derivative."""
     if isinstance(step, Call):
         return type(step) is not Call
     return isinstance(step, (Copy, Add, Gather, Evaluate)) and step.to.startswith(D)
 
 
-def _of_its_end(step: Step) -> Step:
-    """A step about one end alone, where that end is not on the ground."""
+def _skip_ground_end(step: Step) -> Step:
+    """Step of one end only, conditional on that end not being on the ground."""
     slots = [slot for _, slot in step.ports] if isinstance(step, Call) else []
     for role in ("from", "to"):
         if any(slot.startswith(f"{role}.") for slot in slots):
@@ -98,17 +100,17 @@ def _of_its_end(step: Step) -> Step:
 
 
 _FORCE = tuple(slopes(FORCES.steps))
-_FORCE_MOVED = tuple(map(_of_its_end, filter(_moves, _FORCE)))
-#: What is known of the end on the ground.
+_FORCE_MOVED = tuple(map(_skip_ground_end, filter(_computes_derivative, _FORCE)))
+#: Zero derivatives of the end on the ground.
 _GROUNDED = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
 
 FORCES_BY_PLACE = Pass(
     "forces_by_place", "force", "Change of an element to the ground as its body moves.",
     (
-        *(step for step in _FORCE if not _moves(step)),
+        *(step for step in _FORCE if not _computes_derivative(step)),
         *_GROUNDED,
-        *_along("place", *_added("place.S", *_FORCE_MOVED)),
-        ForEachDirection(of="spin", steps=_added("tangent.S", *_FORCE_MOVED)),
+        *_along_position("place", *_accumulate_rows("place.S", *_FORCE_MOVED)),
+        ForEachDirection(of="spin", steps=_accumulate_rows("tangent.S", *_FORCE_MOVED)),
     ),
     skip="!own_force",
 )  # fmt: skip
@@ -118,7 +120,7 @@ FORCES_BY_PLACE = Pass(
 
 
 def column(b: str, d_v: str) -> Step:
-    """A direction's row of B_p."""
+    """Row of B_p for one direction."""
     return call("frames.placed_column", when="placed", theta="local.turn", x="local.shift",
                 v_P="body.v", v="hinge.v", d_v=d_v, Q="local.carrier", B_p=b)  # fmt: skip
 

@@ -1,8 +1,8 @@
-"""The sweep as least squares, in place of `condense`: rows U, d and loads e from tips to root.
+"""Least-squares sweep in place of `condense`: rows U, d and loads e from tips to root.
 
-It keeps digits where heavy bodies hang behind light ones.  Rows lie where S does, and what they
-take where deviations will; whoever reads S and e behind the sweep finds them made of the rows
-again.  The way back is that of the other sweep, by the same gains.
+It keeps accuracy for large mass ratios (heavy bodies outboard of light ones).  Rows use the storage
+of S, and d that of deviations; S and e are recomputed from them for later readers.  The forward
+pass is that of the Riccati sweep, with the same gains.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The Riccati sweep: S and e from tips to root, accelerations from root to tips."""
+"""Riccati sweep: S and e from tips to root, accelerations from root to tips."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _CARRIED = {"S": "local.S", "e": "local.e"}
 _ONWARD = {"S_I": "local.S", "e_I": "local.e"}
 _NO_SPEEDS = {"H": "none", "J": "none", "floor": "zero", "tau": "none"}
 
-#: The columns of H and the rotor inertia of the speeds that nobody imposes, and their efforts.
+#: Columns of H, rotor inertia and efforts of the free speeds.
 FREE = (
     SelectColumns(to="hinge.H_free", source="hinge.H", rows=6),
     SelectColumns(to="hinge.J_free", source="body.rotor"),
@@ -33,7 +33,7 @@ FREE_EFFORTS = SelectColumns(to="hinge.tau_free", source="body.tau")
 
 
 def _transported(rotation: str, place: str) -> tuple[Step, ...]:
-    """S and e by the plain products; the kernel adds to what is there."""
+    """S and e carried by the plain products; the kernel adds to the stored values."""
     return (
         Copy(to="local.S_I"),
         Copy(to="local.e_I"),
@@ -45,10 +45,10 @@ def _transported(rotation: str, place: str) -> tuple[Step, ...]:
 
 
 def transport(stage: str, place: str, when: str) -> Step:
-    """S and e across one stage, by the cheapest kernel that what is known of it allows.
+    """S and e across one stage, by the cheapest kernel for its structure.
 
-    S is carried across a screw by plain products: the double angle costs fewer operations, but
-    takes the small moments behind a long chain from differences of large ones.
+    S is carried across a screw by plain products: the double-angle form needs fewer operations,
+    but computes small moments outboard of a long chain as differences of large ones.
     """
     rotation = f"{stage}.R"
 
@@ -70,8 +70,8 @@ def transport(stage: str, place: str, when: str) -> Step:
     )  # fmt: skip
 
 
-#: Elimination apart from the transport.  Behind a screw about z that leaves H as it is, it is done
-#: in inboard axes, which takes the turn out of the chain of divisions.
+#: Elimination separate from the transport.  After a screw about z that leaves H unchanged, it is
+#: done in inboard axes, which removes the rotation from the chain of divisions.
 _ELIMINATED = {
     **_CARRIED, "F": "hinge.F", "Z": "hinge.Z", "W": "hinge.W", "S_Q": "local.S",
     "e_Q": "local.e", "D_ii": "local.pivots",
@@ -79,7 +79,7 @@ _ELIMINATED = {
 
 
 def condensed(load: str) -> tuple[Step, ...]:
-    """S and a load where the hinge's free speeds are eliminated."""
+    """S and a load after elimination of the hinge's free speeds."""
     return (
         Copy(to="local.S", source="body.S"),
         Copy(to="local.e", source=load),
@@ -88,7 +88,7 @@ def condensed(load: str) -> tuple[Step, ...]:
 
 
 def eliminate_with_effort(effort: str, offset: str) -> tuple[Step, ...]:
-    """S and a load without the hinge's free speeds, on which an effort acts."""
+    """S and a load after elimination of the hinge's free speeds, on which an effort acts."""
     ports = {**_ELIMINATED, "tau": effort, "z": offset}
     return (
         call("hinge.eliminate", when="free special", fails="undetermined", **COORDINATES, **ports),
@@ -97,7 +97,7 @@ def eliminate_with_effort(effort: str, offset: str) -> tuple[Step, ...]:
     )  # fmt: skip
 
 
-#: To the parent, where it is a body.
+#: To the parent, unless it is the ground.
 ONWARD = (
     transport("hinge", "hinge.d", when="hung !axial"),
     transport("connection", "connection.r", when="hung"),
@@ -143,7 +143,7 @@ _FACTORED = {"H": "hinge.H_free", "F": "hinge.F", "Z": "hinge.Z", "z": "hinge.z"
 _RATES = {"udot": "hinge.rates"}
 _STILL = {"H": "none", "G": "none", "g": "none"}
 
-#: Behind `eliminate_with_effort`, stage by stage.
+#: After `eliminate_with_effort`, stage by stage.
 RECOVERED = (
     call("generic0.recover", Rc="connection.R", r="connection.r", **_STILL,
          delta_I="parent.delta", delta="local.delta"),

@@ -1,4 +1,4 @@
-"""Which passes make accelerations, efforts or a solution, in their order."""
+"""Sweeps: sequences of passes for accelerations, efforts and solutions."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _APPLIED = (
     Run(whole=FORCES, when="posed"),
 )
 
-#: Rows closed and multipliers found, in place of `condense` and `recover`.
+#: Closing of rows and computation of multipliers, in place of `condense` and `recover`.
 _CLOSED = (
     Run(hook="rows_begun"),
     Run(whole=CLOSURES),
@@ -93,7 +93,7 @@ ACCELERATIONS = Sweep(
     ),
 )  # fmt: skip
 
-#: Of scenes with closed loops in a plane, where nobody observes.
+#: For planar scenes with closed loops, without observation.
 ACCELERATIONS_IN_PLANE = sweep_in_plane(ACCELERATIONS)
 
 INVERSE_DYNAMICS = Sweep(
@@ -152,8 +152,8 @@ SWEEPS = (GIVEN, ACCELERATIONS, ACCELERATIONS_IN_PLANE, INVERSE_DYNAMICS, CORREC
           POSED, FACTORISATION, SOLUTION, DIRECTIONAL, APPLIED_SLOPE, TANGENT, BROUGHT,
           TANGENT_SOLUTION, TANGENT_BEYOND, LAWS_ALONE, LAWS_SOLUTION, COMPOSITION)  # fmt: skip
 
-#: Passes that the looped engine's own C does for one subject at a time: links and what lies between
-#: their runs, observations, ways to the root.
+#: Passes that the looped engine's C runs for single subjects: links and bodies between runs of
+#: links, observations, paths to the root.
 SINGLY: tuple[Pass, ...] = (
     FORWARD, CONDENSE, RECOVER, HINGE_MOTION, SECTION_MOTION, MOMENTUM, LAGGED, RATES_CHANGE,
     EXERTED, FELT_BY, LINK_TURN, LINK_FORWARD, LINK_CONDENSE, LINK_RECOVER,

@@ -1,9 +1,9 @@
-"""The tangent of inverse dynamics: its derivative along one direction, and all of it factored.
+"""Tangent of inverse dynamics: its derivative along one direction, and its factored form.
 
 `DIRECTIONAL` is inverse dynamics differentiated along a direction.  The other sweeps eliminate the
-unknowns of an implicit step (derive/equations/tangent_sweep.py): along each unknown the motion of
-its body, and what it makes of the load that is carried, come from the same differentiated passes,
-run for that body alone with its parent at rest.
+unknowns of an implicit step (derive/equations/tangent_sweep.py): the motion of a body along each of
+its unknowns and the change of the carried load come from the same differentiated passes, run for
+that body only with its parent at rest.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ from .pass_steps import (
     only,
 )
 
-#: Relative motion across any hinge, and the body behind it.  Inverse dynamics has left the motion
-#: of every hinge in its slots, so that one way across serves all of them.
+#: Relative motion across any hinge, and of the outboard body.  Inverse dynamics has stored the
+#: motion of every hinge in its slots, so one generic step serves all of them.
 _HINGE_MOTION = Pass(
     "hinge_motion", "body", "Relative motion across the hinge.",
     (call("hinge.hinge", **COORDINATES, **HINGE, qdot="body.qdot"),),
 )  # fmt: skip
-#: Its derivative, as other sweeps do it too.
+#: Its derivative, also used by other sweeps.
 HINGE_CHANGE = differentiate_pass(_HINGE_MOTION)
-#: The same where nobody asks for it behind the steps that follow.
+#: The same where later steps do not read it.
 _CHANGED = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
 _CHANGE = elsewhere(HINGE_CHANGE, "", _CHANGED).steps
 _ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
@@ -79,8 +79,8 @@ _FORWARD = Pass(
 )  # fmt: skip
 
 
-def _without_hinges(whole: Pass) -> Pass:
-    """Hinges have their motion already."""
+def _skip_hinge_motion(whole: Pass) -> Pass:
+    """The pass without hinge motion, which is already known."""
     steps = (step for step in whole.steps if not isinstance(step, RunPass))
     return replace(whole, steps=tuple(steps))
 
@@ -92,7 +92,7 @@ _MOVED_ALONG = (
     Run(hook="expression_slopes", when="valued"),
     Run(whole=differentiate_pass(_FORWARD)),
 )
-_POSED = Run(whole=differentiate_pass(_without_hinges(POSES)), when="posed")
+_POSED = Run(whole=differentiate_pass(_skip_hinge_motion(POSES)), when="posed")
 _ACTING = (
     Run(whole=differentiate_pass(DRAG), when="posed flexible"),
     Run(whole=differentiate_pass(LOADS), when="posed"),
@@ -102,7 +102,7 @@ _COUPLED = (
     Run(hook="coupling_slopes", when="couplings"),
     Run(whole=differentiate_pass(COUPLINGS_LOADED), when="couplings"),
 )
-_CLOSED = Run(whole=differentiate_pass(_without_hinges(CLOSURES_LOADED)), when="looped")
+_CLOSED = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURES_LOADED)), when="looped")
 DIRECTIONAL = Sweep(
     "required_slope", "Derivative of the efforts that given accelerations need.",
     (
@@ -113,24 +113,24 @@ DIRECTIONAL = Sweep(
         _POSED,
         *_ACTING,
         _CLOSED,
-        Run(whole=differentiate_pass(_without_hinges(REQUIRED))),
+        Run(whole=differentiate_pass(_skip_hinge_motion(REQUIRED))),
     ),
 )  # fmt: skip
 
 _NO_LOADS = Pass("no_loads", "body", "Loads begun from none.", (Copy(to=D + "body.e"),))
 
 
-def _across(whole: Pass, own: str) -> Run:
-    """Without what the elimination sees."""
+def _across_tree(whole: Pass, own: str) -> Run:
+    """Derivative of a pass, limited to what the elimination does not include."""
     return Run(
         whole=replace(differentiate_pass(whole), name=f"{whole.name}_across", skip=own),
         when="posed",
     )
 
 
-#: What acts on a body by what others do: springs between bodies, loads in axes of other bodies, the
-#: values of expressions and hinges that close loops reach across the tree, so that the elimination
-#: does not see them.
+#: Loads on a body that depend on others: springs between bodies, loads in axes of other bodies,
+#: expression values and cut hinges couple distant parts of the tree, so the elimination does not
+#: include them.
 APPLIED_SLOPE = Sweep(
     "applied_slope",
     "Derivative of what acts across the tree, and of the values of expressions.",
@@ -138,11 +138,11 @@ APPLIED_SLOPE = Sweep(
         *_MOVED_ALONG,
         _POSED,
         Run(whole=_NO_LOADS, when="posed"),
-        _across(LOADS, "own_load"),
-        _across(FORCES, "own_force"),
+        _across_tree(LOADS, "own_load"),
+        _across_tree(FORCES, "own_force"),
         Run(whole=differentiate_pass(EFFORTS), when="looped"),
         *_COUPLED,
-        # In the tree the elimination sees them.
+        # Within the tree they are part of the elimination.
         Run(
             whole=replace(differentiate_pass(LAWS), name="laws_across", skip="!shut"), when="looped"
         ),
@@ -154,7 +154,7 @@ APPLIED_SLOPE = Sweep(
 # --- along the unknowns of one body -------------------------------------------------------------
 
 
-#: What the derivatives of a hinge or of a section are made into, and the numbers that go with them.
+#: Outputs formed from derivatives of a hinge or section, and their further inputs.
 _ACROSS_NOW = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
 _CARRIER = call("generic{nu}.tangent_carrier", **_ACROSS_NOW, s="body.s", c="hinge.c",
                 motion="body.motion", Q="local.carrier")  # fmt: skip
@@ -166,7 +166,7 @@ def _turn(change: Callable[[str], str]) -> Call:
 
 
 def _column(b: str, g: str, laws: str) -> dict[str, str]:
-    """A direction's row of B and of G, and what the hinge's rows change by."""
+    """Slots of a direction's rows of B and G, and of the change of the hinge's rows."""
     return {
         **_TURNED, **_ACROSS_NOW, "Q": "local.carrier", "f": "body.e", "d_s": D + "body.given",
         "J": "body.rotor", "laws": laws, "B": b, "G": g, "row": "local.change",
@@ -186,7 +186,7 @@ def _changes(change: Callable[[str], str]) -> dict[str, str]:
 
 
 def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
-    """Where the derivatives of modes point: of a section and, in d:modes.felt, of the rows."""
+    """B, G and B_p along modes from derivatives of a section and, in d:modes.felt, of rows."""
     felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
                 tau="modes.felt")  # fmt: skip
     return (
@@ -199,7 +199,7 @@ def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
 
 
 def _section(matrices: str) -> tuple[Step, ...]:
-    """A section has no speeds: its rows are those of the modes."""
+    """Steps of a section, which has no speeds: its rows are those of the modes."""
     return (
         _CARRIER,
         ForEachDirection(
@@ -216,7 +216,7 @@ def _section(matrices: str) -> tuple[Step, ...]:
 
 
 def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
-    """Where the derivatives of a hinge point; its rows in local.change."""
+    """B, G and B_p along a hinge's unknown, from its derivatives; its rows in local.change."""
     column = _column(b, g, laws)
     turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
@@ -287,7 +287,7 @@ LAGGED = Pass(
 
 # --- factored -----------------------------------------------------------------------------------
 
-#: Change of a law's efforts by its hinge alone: what expressions add to them reaches further.
+#: Change of a law's efforts by its own hinge only; expressions may depend on more.
 LAW_CHANGE = tuple(
     DifferentiatedCall(
         step.when, step.kernel + SLOPE, tuple({**dict(step.ports), "effort": "none"}.items()),
@@ -353,7 +353,7 @@ _NODE = {
 _ROWS = {"K": "local.K", "right": "local.right"}
 _TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
 
-#: What a body brings, linear in what its unknowns change: nothing here is eliminated.
+#: Contribution of a body, linear in its unknowns, before elimination.
 _COLUMNS = (
     *only("modal section", *_section("bend")),
     *only("moving", *_HINGE),
@@ -391,7 +391,7 @@ TANGENT_CONDENSE = Pass(
     order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
-#: The same in two, where many tangents are made of one state: what bodies bring is made once.
+#: The same in two passes, for many tangents at one state: contributions are computed once.
 TANGENT_BROUGHT = Pass(
     "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="aside"
 )
@@ -480,7 +480,7 @@ _SPREAD = ScatterSpeeds(to="body.answer", free="local.x")
 
 
 def _behind_modes(*known: Step) -> tuple[Step, ...]:
-    """Motion behind a body's own modes or those of the body that it is an end of."""
+    """Motion outboard of a body's own modes, or of those of the body that it is an end of."""
     return (
         call("frames.tangent_moved", when="!moving", **_BEHIND),
         *known,
@@ -557,8 +557,8 @@ _KNOWN_ROWS = (
 )
 _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
 
-#: Rows of a hinge are those of the load that is carried by its change along what is known, less
-#: the right-hand side and what laws make of it, which KNOWN_COLUMN and KNOWN_LAWS put together.
+#: Rows of a hinge: carried load by the known increments, less the right-hand side and the change of
+#: laws, which KNOWN_COLUMN and KNOWN_LAWS add.
 KNOWN_CARRIED = Pass(
     "known_carried", "body", "The same loads carried to the parent, with what is known.",
     (
