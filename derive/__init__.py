@@ -1,7 +1,7 @@
-"""Symbols to C text: derivations, checks, lowering, rendering.  The only room that knows SymPy.
+"""Derivation of C from symbols: definitions, checks, lowering, rendering.
 
-What a definition of an element needs is imported when it is asked for: printing the fused code of a
-scene needs no SymPy.
+The only package that uses SymPy.  Names that need SymPy are imported on first use, because printing
+the fused code of a scene works without it.
 """
 
 from __future__ import annotations

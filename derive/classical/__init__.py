@@ -1,1 +1,1 @@
-"""The classical transfer matrices: one file per element, each a Derivation with its premises."""
+"""Classical transfer matrices: one file per element, each a Derivation with its premises."""

@@ -1,9 +1,9 @@
-"""Acceleration hinge along any of its six (in the plane three) directions, cf. (5.74).
+"""Acceleration hinge with any free directions (of six, in the plane three), cf. (5.74).
 
-Rui, Wang, Zhang, ch. 5, (5.62) to (5.74), free all six directions and move the efforts of springs
-and dampers to the loads of the two bodies.  Here the efforts stay in the hinge: along a free
-direction the wrench at the outboard point is the given tau.  The offset d of the outboard from the
-inboard point is kept: the inboard side also feels d x q.
+Rui, Wang, Zhang, ch. 5, (5.62) to (5.74), release all six directions and move the efforts of
+springs and dampers to the loads of the two bodies.  Here the efforts stay in the hinge: along a
+free direction the wrench at the outboard point is the given tau.  The offset d of the outboard from
+the inboard point is kept: the inboard side is also loaded by d x q.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _NOTES = (
 
 
 def derivation(free: tuple[str, ...] = SPATIAL_DIRECTIONS, planar: bool = False) -> Derivation:
-    """U_h of the hinge that leaves the directions `free` to given efforts.
+    """U_h of a hinge with given efforts along the directions `free`.
 
     `free` names directions of the hinge axes in this order: x y z (translations), rx ry rz
     (rotations); in the plane x y rz.  Raises ValueError for none, unknown or repeated directions.
@@ -200,7 +200,7 @@ def _effort_conditions(
 def _select_used_inputs(
     inputs: tuple[Quantity, ...], premises: tuple[Equation, ...], conditions: tuple[Equation, ...]
 ) -> tuple[Quantity, ...]:
-    """Inputs that some equation mentions (full sets of directions need no axes)."""
+    """Inputs that occur in some equation (complete sets of directions need no axes)."""
     used_symbols: set[sp.MatrixSymbol] = set()
     for equation in (*premises, *conditions):
         used_symbols |= matrix_symbols(equation.left) | matrix_symbols(equation.right)

@@ -1,7 +1,7 @@
 """Catalogue of the classical transfer matrices and their guards.
 
-`CLASSICAL` names them all, those of the discrete-time form included; `classical_guards` are the
-pivot guards to lower them with.
+`CLASSICAL` contains all of them, including those of the discrete-time form; `classical_guards` are
+the pivot guards for lowering.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ def classical_guards(derivation: Derivation) -> tuple[tuple[sp.Basic, int, str],
 
 @cache
 def classical_derivation(name: str) -> Derivation:
-    """The classical matrix `name`, derived once in a process."""
+    """Derivation of the classical matrix `name`, cached in the process."""
     return CLASSICAL[name]()
 
 
 def classical_spec(name: str) -> ElementSpec:
-    """What generation needs of a classical element: one kernel, `transfer`."""
+    """ElementSpec of a classical element: one kernel, `transfer`."""
     derivation = classical_derivation(name)
     kernel = lower(derivation, "transfer", classical_guards(derivation))
     return ElementSpec(

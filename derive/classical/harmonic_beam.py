@@ -1,8 +1,8 @@
-"""Transfer matrices of a beam that vibrates harmonically: Rui, Wang, Zhang, ch. 2.
+"""Transfer matrices of a beam in harmonic vibration: Rui, Wang, Zhang, ch. 2.
 
 The state is [w, w', w'', w'''], deflection, slope, and moment and shear over the bending stiffness.
-The solutions of the field equation w'''' = beta^4 w, beta^4 = rho A omega^2 / (E I), are normed to
-the state at the input end: Krylov's functions.
+The solutions of the field equation w'''' = beta^4 w, beta^4 = rho A omega^2 / (E I), are normalised
+to the state at the input end: Krylov's functions.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ def field_matrix() -> sp.ImmutableMatrix:
 
 
 def mass_matrix(ratio: sp.Expr) -> sp.ImmutableMatrix:
-    """Of a point mass of `ratio` = m / (rho A): its inertia acts as the beam's own does."""
+    """Transfer matrix (4, 4) of a point mass with `ratio` = m / (rho A)."""
     return _shear_matrix(ratio * BETA**4)
 
 
 def spring_matrix(ratio: sp.Expr) -> sp.ImmutableMatrix:
-    """Of a spring to the ground, across the beam, of `ratio` = k / (E I)."""
+    """Transfer matrix (4, 4) of a transverse spring to the ground with `ratio` = k / (E I)."""
     return _shear_matrix(-ratio)
 
 

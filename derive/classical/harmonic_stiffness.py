@@ -1,22 +1,22 @@
-"""Dynamic stiffness of a uniform beam and rod that vibrate harmonically, from their field matrices.
+"""Dynamic stiffness of a uniform beam and rod in harmonic vibration, from field matrices.
 
-Between the ends' displacements d = (d_0, d_L) and the loads on the ends lies, with the field matrix
-U that carries displacements and internal loads p along,
+With the field matrix U, which relates displacements d and internal loads p at both ends, the ends'
+displacements d = (d_0, d_L) give
 
     p_0 = U_dp^-1 (d_L - U_dd d_0),      p_L = U_pd d_0 + U_pp p_0,
 
-of a beam with d = (w, w') and p = (w'', w'''), loads (E I w''', -E I w'') on the root and
-(-E I w''', E I w'') on the tip, of a rod with d = u and p = u'.  All is of length and stiffness 1;
-the only number is
+for a beam with d = (w, w') and p = (w'', w'''), loads (E I w''', -E I w'') on the root and (-E I
+w''', E I w'') on the tip, for a rod with d = u and p = u'.  Length and stiffness are 1; the only
+parameter is
 
     beam: zeta = z^4 = -rho A s^2 l^4 / (E I),      rod: zeta = z^2 = -rho A s^2 l^2 / (E A)
 
-at exp(s t), complex where there is damping.  Hyperbolic functions are counted in parts of exp(z),
-which numerator and denominator share, so that nothing overflows.
+at exp(s t), complex with damping.  Hyperbolic functions are scaled by exp(z), a common factor of
+numerator and denominator, so that nothing overflows.
 
 The term of order 0 in zeta is the static stiffness, that of order 1 the mass of the element with
 polynomial shapes (Przemieniecki, Theory of Matrix Structural Analysis, ch. 12).  The kernels give
-what is beyond the first: it alone knows of rigid motions, and the mass of these is found next to a
+the stiffness less its term of order 0, because the mass of rigid motions would be lost next to a
 stiffness that is larger by 1 / zeta.  Near zeta = 0 it is a power series, where the quotients would
 cancel.
 """
@@ -41,8 +41,9 @@ _DERIVATIVES = {
     sp.cosh: (1, 0, 1, 0), sp.sinh: (0, 1, 0, 1), sp.cos: (1, 0, -1, 0), sp.sin: (0, 1, 0, -1),
 }  # fmt: skip
 _CIRCULAR = {sp.cos(_Z): _COS, sp.sin(_Z): _SIN}
-#: Terms of the power series beyond the first two, |zeta| up to which it is taken: there
-#: the last one is below rounding, zeta being 500 at the first pole of the beam and 10 of the rod.
+#: Number of power series terms beyond the first two, and |zeta| up to which the series is used:
+#: there the last term is below rounding; the first pole is at zeta = 500 for the beam and 10 for
+#: the rod.
 _SERIES_TERM_COUNT, _MAX_SERIES_ZETA_BEAM, _MAX_SERIES_ZETA_ROD = 8, 5, sp.Rational(1, 10)
 
 ZETA = Quantity(vector("zeta", 2), "", "real and imaginary part of zeta")
@@ -70,8 +71,10 @@ def rod_stiffness() -> tuple[sp.ImmutableMatrix, sp.Expr]:
 def _stiffness_from_field_matrix(
     field: Matrix, loads: Matrix, scale: sp.Expr
 ) -> tuple[sp.ImmutableMatrix, sp.Expr]:
-    """Loads on both ends by their displacements, as numerators over `scale` det U_dp; `loads`
-    makes those on the root of p_0."""
+    """End loads by end displacements, as numerators over `scale` det U_dp.
+
+    `loads` maps p_0 to the loads on the root.
+    """
     m = field.rows // 2
     dd, dp, pd, pp = field[:m, :m], field[:m, m:], field[m:, :m], field[m:, m:]
     root = sp.Matrix.hstack(-dp.adjugate() * dd, dp.adjugate())
@@ -82,7 +85,7 @@ def _stiffness_from_field_matrix(
 
 
 def _reduce_polynomial(expression: sp.Expr) -> sp.Expr:
-    """A polynomial of z, cosh z, sinh z, cos z and sin z without their known squares."""
+    """Polynomial of z, cosh z, sinh z, cos z and sin z with reduced squares."""
     symbols = {name(_Z): sp.Dummy(str(name)) for name in _DERIVATIVES}
     cosh_, sinh_, cos_, sin_ = symbols.values()
     identities = [cosh_**2 - sinh_**2 - 1, cos_**2 + sin_**2 - 1]
@@ -130,7 +133,7 @@ def _taylor_coefficients(expression: sp.Expr, count: int) -> list[sp.Rational]:
 
 @cache
 def _function_series(name: type[sp.Function], count: int) -> sp.Poly:
-    """The power series of a function, whose derivatives at 0 repeat."""
+    """Power series of a function whose derivatives at 0 repeat."""
     cycle = _DERIVATIVES[name]
     terms = (cycle[k % 4] * _Z**k / sp.factorial(k) for k in range(count))
     return sp.Poly(sum(terms, sp.Integer(0)), _Z)
@@ -150,7 +153,7 @@ def _complex_product(a: Pair, b: Pair) -> Pair:
 
 
 def _evaluate_polynomial(expression: sp.Expr, values: dict[sp.Symbol, Pair]) -> Pair:
-    """A polynomial of complex symbols in parts."""
+    """Polynomial of complex symbols, in real and imaginary parts."""
     total: Pair = (sp.Integer(0), sp.Integer(0))
     symbols = list(values)
     for powers, coefficient in sp.Poly(sp.expand(expression), *symbols).terms():

@@ -1,14 +1,14 @@
-"""How a classical hinge gets its matrix: the next hinge's condition gives the free acceleration.
+"""Matrix of a classical hinge: the next hinge's condition gives its free acceleration.
 
-A hinge by itself says nothing about its free accelerations.  The books take them from the effort
-condition L (m, q)_N = t of the hinge that follows the outboard body: with the state behind the
-hinge z_O = E z_I + G alpha and the force rows F of the outboard body's transfer matrix,
+A hinge alone does not determine its free accelerations.  The books use the effort condition L (m,
+q)_N = t of the hinge outboard of the next body: with the state outboard of the hinge z_O = E z_I +
+G alpha and the force rows F of the outboard body's transfer matrix,
 
     (L F G) alpha = t - L F E z_I,        U_hinge = E + G K,   K = (L F G)^-1 (t - L F E).
 
 The pivot L F G depends on one body only and may vanish in systems that are perfectly regular.
 `margin` measures how close it is: 1 / |(L F G)^-1| (|L| F_scale |G|) in the row-sum norm, at most
-about 1, and zero when the pivot vanishes.  `pivot_guards` leaves the kernel below `PIVOT_LIMIT`.
+about 1, and zero when the pivot vanishes.  `pivot_guards` stops the kernel below `PIVOT_LIMIT`.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from ..definition.derivation import Derivation, Equation, Quantity, Solve
 from ..definition.notation import Matrix, residual, solve_linear
 from .state_vector import BOOK, StateVector, append_affine_row
 
-#: Relative size below which a pivot counts as vanished, and the failure code of a kernel then.
+#: Relative size below which a pivot counts as zero, and the failure code of the kernel.
 PIVOT_LIMIT = sp.Rational(1, 10**8)
 VANISHING_PIVOT = 2
 
 
 @dataclass(frozen=True)
 class HingeStatement:
-    """Premises of one classical hinge; elimination gives everything else.
+    """Premises of one classical hinge, from which elimination derives its matrix.
 
     `premises` give the outboard state (end O) from the inboard state (end I) and the
     free accelerations; `conditions` are the next hinge's equations for m and q at the output end N
@@ -175,7 +175,7 @@ def _margin_equations(statement: HingeStatement, scale: sp.MatrixSymbol) -> tupl
 
 
 def pivot_guards(hinge: Derivation) -> tuple[tuple[sp.Basic, int, str], ...]:
-    """Guards for `derive.lower.kernel.lower`: leave with VANISHING_PIVOT below PIVOT_LIMIT."""
+    """Guards for `derive.lower.kernel_lowering.lower`: VANISHING_PIVOT below PIVOT_LIMIT."""
     margin = next(q.symbol for q in hinge.outputs if q.name == "margin")
     return (
         (

@@ -21,7 +21,7 @@ BOOK = "Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 20
 
 @dataclass(frozen=True)
 class StateVector:
-    """Blocks of a state vector: names, lengths and units, without the closing 1."""
+    """Blocks of a state vector: names, lengths and units, without the final 1."""
 
     names: tuple[str, ...]
     sizes: tuple[int, ...]
@@ -29,16 +29,16 @@ class StateVector:
 
     @property
     def length(self) -> int:
-        """Numbers in the state, the closing 1 included."""
+        """Number of entries, including the final 1."""
         return sum(self.sizes) + 1
 
     @property
     def accelerations(self) -> int:
-        """Numbers that describe acceleration; they come first, as many forces follow."""
+        """Number of acceleration entries; they come first, followed by as many forces."""
         return self.sizes[0] + self.sizes[1]
 
     def at(self, end: str) -> tuple[sp.MatrixSymbol, ...]:
-        """The blocks at the end called `end`, e.g. rdd_I, omegadot_I, m_I, q_I."""
+        """Blocks at the end called `end`, e.g. rdd_I, omegadot_I, m_I, q_I."""
         blocks = zip(self.names, self.sizes, strict=True)
         return tuple(vector(f"{name}_{end}", size) for name, size in blocks)
 
@@ -63,7 +63,7 @@ def transfer_matrix(premises: Sequence[Equation], state: StateVector) -> Matrix:
 
 
 def append_affine_row(rows: Matrix) -> Matrix:
-    """Rows of a transfer matrix with the closing row 0 ... 0 1 below them."""
+    """Rows of a transfer matrix with the final row 0 ... 0 1."""
     return Matrix(rows.col_join(sp.Matrix([[0] * (rows.cols - 1) + [1]])))
 
 

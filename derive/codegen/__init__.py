@@ -1,1 +1,1 @@
-"""KernelIR becomes C text.  No SymPy: somebody waits."""
+"""C text from KernelIR, without SymPy because it runs at compile time."""

@@ -152,10 +152,13 @@ def _leading_runs(runs: list[Run | TiledRun]) -> list[Run]:
     return leading
 
 
-def _tiled_run(before: list[Run], last: Run, swept: Pass) -> TiledRun:
-    starting = tuple(run for run in before if _is_local_run(run))
+def _tiled_run(runs_before: list[Run], last: Run, swept: Pass) -> TiledRun:
+    starting = tuple(run for run in runs_before if _is_local_run(run))
     return TiledRun(
-        (*before, last), tuple(run for run in before if not _is_local_run(run)), starting, swept
+        (*runs_before, last),
+        tuple(run for run in runs_before if not _is_local_run(run)),
+        starting,
+        swept,
     )
 
 
@@ -172,12 +175,12 @@ def _is_local_run(run: Run) -> bool:
     return not any(_uses_other_bodies(step) for step in steps) and not sweep_pass.given
 
 
-def _uses_other_bodies(step: Step, known: tuple[str, ...] = ()) -> bool:
-    if not known and (("section", True) in step.traits or ("outward", True) in step.traits):
+def _uses_other_bodies(step: Step, own_owners: tuple[str, ...] = ()) -> bool:
+    if not own_owners and (("section", True) in step.traits or ("outward", True) in step.traits):
         return True
     if isinstance(step, RunPass):
         return False  # its steps are examined separately
     slots = [str(value) for value in vars(step).values()]
     slots += [slot for _, slot in getattr(step, "ports", ())]
     owners = {slot.removeprefix(D).split(".")[0] for slot in slots}
-    return not owners.isdisjoint(set(_OTHER_OWNERS) - set(known))
+    return not owners.isdisjoint(set(_OTHER_OWNERS) - set(own_owners))

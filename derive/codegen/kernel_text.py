@@ -1,7 +1,7 @@
 """Statements of a KernelIR as C text: names, literals, expressions.  No templates here.
 
-Everything is spelled so that the C computes what `derive.audit.evaluate` computes with plain
-floats, operation by operation, and so that a NaN is never hidden by min, max, sign or a guard.
+The C computes what `derive.verification.kernel_evaluation` computes with plain floats, operation by
+operation, and a NaN is never hidden by min, max, sign or a guard.
 """
 
 from __future__ import annotations

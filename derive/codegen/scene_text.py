@@ -36,7 +36,7 @@ __all__ = ["ABI_VERSION", "COMPILER_FLAGS", "function_text", "fused_sources", "s
 
 
 class FusedKernels(Protocol):
-    """Result of `derive.fuse.scene`: kernels by name, and the meaning of their guard codes."""
+    """Result of `derive.fuse.scene_kernels`: kernels by name, and their guard codes."""
 
     @property
     def kernels(self) -> Mapping[str, KernelIR]:
@@ -58,9 +58,9 @@ typedef double real;
 #define MSTMM_LITERAL(number) number
 """
 
-#: Up to this many operations a kernel waits for results, and its parts are merged (`streams`).
-#: Longer ones wait for their own instructions (the cache for them holds 32 kB on most processors),
-#: lanes for the multipliers: there registers are saved (`thrift`).
+#: Kernels with at most this many operations are limited by latency, and independent parts are
+#: interleaved.  Longer ones are limited by instruction fetch (32 kB cache on most processors),
+#: lanes by arithmetic units: there register pressure is reduced.
 _MAX_INTERLEAVED_FLOPS = 3000
 #: Outputs of "accelerations_power" after those of "accelerations".
 _ENERGY_OUTPUTS = ("power", "potential")

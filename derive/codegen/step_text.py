@@ -136,7 +136,7 @@ class StepText:
             return slot_location
         name, _, entry_index = slot.partition("[")
         if not name.removeprefix(D).startswith("local.") and name.removeprefix(D) not in SLOTS:
-            raise ValueError(f"pass {self.name}: unknown slot {name!r} (schedule/words.py)")
+            raise ValueError(f"pass {self.name}: unknown slot {name!r} (slot_definitions.py)")
         text = (
             f"{local_name(name)} + {entry_index.rstrip(']')}" if entry_index else local_name(name)
         )

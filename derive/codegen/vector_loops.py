@@ -75,7 +75,7 @@ class VectorLoop:
 class VectorLoops:
     """Vector loops of one kernel, and the remaining stores."""
 
-    def __init__(self, kernel: KernelIR, asked: Sequence[tuple[str, int]]) -> None:
+    def __init__(self, kernel: KernelIR, requests: Sequence[tuple[str, int]]) -> None:
         if kernel.size_symbol is not None:
             raise ValueError(
                 f"{kernel.name}: expected a fixed size, found a kernel of run-time size"
@@ -84,8 +84,8 @@ class VectorLoops:
         self.assigned = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
         self.ports = {port.name: port for port in kernel.outputs}
         self.kept: dict[Operand, Element] = {}
-        self.loops = [self._loop(self.ports[name], axis) for name, axis in asked]
-        looped_names = {name for name, _ in asked}
+        self.loops = [self._loop(self.ports[name], axis) for name, axis in requests]
+        looped_names = {name for name, _ in requests}
         remaining_statements = [s for s in kernel.statements if not isinstance(s, Assign)]
         if not all(isinstance(s, Store) for s in remaining_statements):
             raise ValueError(f"{kernel.name}: a guard among loops")
@@ -178,19 +178,21 @@ class _Builder:
         assert isinstance(first_lane, Temporary)
         return LaneValue(len(self.loop.values), self.whole.assigned[first_lane.number].op, args)
 
-    def _args(self, first: Operand, other: Operand, k: int) -> tuple[Operand, ...]:
+    def _args(self, first: Operand, operand: Operand, k: int) -> tuple[Operand, ...]:
         """Operands of lane k, in the order of those of the first lane."""
-        assert isinstance(first, Temporary) and isinstance(other, Temporary)
-        reference_args, operand_args = (self.whole.assigned[o.number].args for o in (first, other))
+        assert isinstance(first, Temporary) and isinstance(operand, Temporary)
+        reference_args, operand_args = (
+            self.whole.assigned[o.number].args for o in (first, operand)
+        )
         if all(self.alike(a, b, k) for a, b in zip(reference_args, operand_args, strict=True)):
             return operand_args
         return operand_args[::-1]
 
-    def alike(self, first: Operand, other: Operand, k: int) -> bool:
+    def alike(self, first: Operand, operand: Operand, k: int) -> bool:
         """Whether an operand of lane k has the same computation as in the first lane."""
-        key = first, other, k
+        key = first, operand, k
         if key not in self.like:
-            self.like[key] = first == other or self._alike(first, other, k)
+            self.like[key] = first == operand or self._alike(first, operand, k)
         return self.like[key]
 
     def _alike(self, first: Operand, other: Operand, k: int) -> bool:

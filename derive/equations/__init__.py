@@ -1,1 +1,1 @@
-"""Newton-Euler, hinges, laws and the sweep as matrix equations of symbols."""
+"""Symbolic matrix equations: Newton-Euler, hinges, laws and the sweep."""

@@ -1,12 +1,12 @@
-"""What a hinge holds: the directions that its motion subspace leaves over.
+"""Constrained directions of a hinge: the complement of its motion subspace.
 
-Of the six directions between the two sides of a hinge, H spans those along which it lets go.  Rows
+Of the six directions between the two sides of a hinge, H spans the free ones.  The rows of
 
     W = [H^+; N^T],  H^+ = (H^T H)^-1 H^T,  N^T H = 0,  N^T N = 1
 
-tell of a relative motion how fast the hinge's own speeds go, and behind them what the hinge holds.
-N stands on reflections that take the columns of H to coordinate directions one by one (Householder,
-J. ACM 5 (1958) 339-342), so that axes along coordinates leave coordinate directions.
+applied to a relative motion give the hinge's own speeds, then the constrained components.  N is
+formed by reflections that map the columns of H to coordinate directions one by one (Householder, J.
+ACM 5 (1958) 339-342), so that axes along coordinates leave coordinate directions.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .block_matrices import symbol
 
 SOURCES = ("Householder, J. ACM 5 (1958) 339-342 (reflections)",)
 
-#: Rows of W, one below the other: each is a load along which the hinge moves or holds.
+#: Rows of W; each is a load along a free or a constrained direction.
 DIRECTIONS = Quantity(symbol("W", 6, 6), "", "rows: H^+, then what the hinge holds")
 
 
@@ -29,23 +29,29 @@ def complement(nu: int) -> Derivation:
     reflected: sp.Basic = h.symbol
     mirrors: list[tuple[sp.MatrixSymbol, sp.MatrixSymbol]] = []
     for k in range(nu):
-        mirror, more = _mirror(k, reflected)
-        equations += more
+        mirror, equations_of_mirror = _reflection(k, reflected)
+        equations += equations_of_mirror
         mirrors.append(mirror)
         if k + 1 < nu:
-            onward = symbol(f"H_{k + 1}", 6, nu)
+            next_matrix = symbol(f"H_{k + 1}", 6, nu)
             equations.append(
-                Equation(f"H, reflected {k + 1} times", onward, _reflected(mirror, reflected))
+                Equation(
+                    f"H, reflected {k + 1} times", next_matrix, _apply_reflection(mirror, reflected)
+                )
             )
-            reflected = onward
-    held: sp.Basic = sp.ImmutableDenseMatrix(6, 6 - nu, lambda i, j: sp.Integer(i == j + nu))
+            reflected = next_matrix
+    constrained: sp.Basic = sp.ImmutableDenseMatrix(6, 6 - nu, lambda i, j: sp.Integer(i == j + nu))
     for k in reversed(range(nu)):
-        onward = symbol(f"N_{k + 1}", 6, 6 - nu)
+        next_matrix = symbol(f"N_{k + 1}", 6, 6 - nu)
         if nu < 6:
             equations.append(
-                Equation(f"N, behind mirror {k + 1}", onward, _reflected(mirrors[k], held))
+                Equation(
+                    f"N, behind mirror {k + 1}",
+                    next_matrix,
+                    _apply_reflection(mirrors[k], constrained),
+                )
             )
-            held = onward
+            constrained = next_matrix
     rows: list[list[sp.Expr]] = []
     if nu:
         gram, inverse = symbol("HH", nu, nu), symbol("H_inv", nu, 6)
@@ -54,7 +60,7 @@ def complement(nu: int) -> Derivation:
             Equation("H^+", inverse, Solve(gram, h.symbol.T, symmetric=True)),
         ]
         rows += [[inverse[k, i] for i in range(6)] for k in range(nu)]
-    rows += [[held[i, j] for i in range(6)] for j in range(6 - nu)]
+    rows += [[constrained[i, j] for i in range(6)] for j in range(6 - nu)]
     equations.append(Equation("W", DIRECTIONS.symbol, sp.ImmutableDenseMatrix(rows)))
     return Derivation(
         f"generic{nu}",
@@ -66,10 +72,10 @@ def complement(nu: int) -> Derivation:
     )
 
 
-def _mirror(
+def _reflection(
     k: int, matrix: sp.Basic
 ) -> tuple[tuple[sp.MatrixSymbol, sp.MatrixSymbol], list[Equation]]:
-    """v and b of the reflection 1 - b v v^T that leaves of column k what is along direction k."""
+    """v and b of the reflection 1 - b v v^T that maps column k to direction k."""
     size, v, b = symbol(f"size_{k + 1}", 1), symbol(f"v_{k + 1}", 6), symbol(f"b_{k + 1}", 1)
     length, first = size[0, 0], matrix[k, k]
     away = first + sp.Piecewise((-length, first < 0), (length, True))
@@ -88,10 +94,12 @@ def _mirror(
     ]  # fmt: skip
 
 
-def _reflected(mirror: tuple[sp.MatrixSymbol, sp.MatrixSymbol], matrix: sp.Basic) -> sp.Basic:
+def _apply_reflection(
+    mirror: tuple[sp.MatrixSymbol, sp.MatrixSymbol], matrix: sp.Basic
+) -> sp.Basic:
     v, b = mirror
     rows, columns = (int(extent) for extent in matrix.shape)
-    along = [sum(v[i, 0] * matrix[i, j] for i in range(rows)) for j in range(columns)]
+    projections = [sum(v[i, 0] * matrix[i, j] for i in range(rows)) for j in range(columns)]
     return sp.ImmutableDenseMatrix(
-        rows, columns, lambda i, j: matrix[i, j] - b[0, 0] * v[i, 0] * along[j]
+        rows, columns, lambda i, j: matrix[i, j] - b[0, 0] * v[i, 0] * projections[j]
     )

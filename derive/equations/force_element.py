@@ -22,7 +22,7 @@ def _explicit(array: sp.MatrixSymbol) -> sp.Matrix:
 
 
 def relative_motion() -> tuple[tuple[Equation, ...], tuple[sp.MatrixSymbol, ...]]:
-    """Position, rate, rotation and angular velocity of T against F, in F axes."""
+    """Position, rate, rotation and angular velocity of T relative to F, in F axes."""
     a_f, a_t = _matrix("A_F"), _matrix("A_T")
     x_f, x_t, v_f, v_t, w_f, w_t = (
         vector(n, 3) for n in ("x_F", "x_T", "v_F", "v_T", "w_F", "w_T")
@@ -54,12 +54,12 @@ def wrench(element: ForceElement) -> Derivation:
     beyond, rates = sp.Matrix([*force, *moment]), sp.Matrix([*v, *w])
     deflection, steps = element.deflection(x, rotation, p), list[Equation]()
     if deflection is None:
-        energy, push = _gradient(element, x, p)
+        energy, push = _potential_gradient(element, x, p)
         load, lost = beyond, (beyond - sp.Matrix([*push, 0, 0, 0])).dot(rates)
     else:
         bent = _explicit(vector("bent", len(deflection)))
-        energy, push = _gradient(element, bent, p)
-        steps, pull = _deflected(deflection, x, rotation, push)
+        energy, push = _potential_gradient(element, bent, p)
+        steps, pull = _deflection_equations(deflection, x, rotation, push)
         load, lost = beyond + pull, beyond.dot(rates)
     replace = {s: parameters[i, 0] for i, s in enumerate(p)}
     replace |= {effort: vector("effort", 1)[0, 0], t: vector("t", 1)[0, 0]}
@@ -108,38 +108,38 @@ def wrench(element: ForceElement) -> Derivation:
     )
 
 
-def _gradient(
+def _potential_gradient(
     element: ForceElement, deflection: sp.Matrix, p: Symbols
 ) -> tuple[sp.Expr, sp.Matrix]:
-    """The potential of a deflection, and minus its slopes."""
+    """Potential of a deflection, and its negative gradient."""
     names = sp.Matrix([sp.Dummy(real=True) for _ in deflection])
-    there = dict(zip(names, deflection, strict=True))
+    values = dict(zip(names, deflection, strict=True))
     energy = sp.sympify(element.potential(names, p))
-    push = sp.Matrix([-slope(energy, name).xreplace(there) for name in names])
-    return energy.xreplace(there), push
+    push = sp.Matrix([-slope(energy, name).xreplace(values) for name in names])
+    return energy.xreplace(values), push
 
 
-def _deflected(
+def _deflection_equations(
     deflection: sp.Matrix, x: sp.Matrix, rotation: sp.Matrix, push: sp.Matrix
 ) -> tuple[list[Equation], sp.Matrix]:
-    """Deflection, how it goes with rates of x and turns of T, and the load of a push along it."""
+    """Deflection, its derivatives by rates of x and rotations of T, and the resulting load."""
     n, units = len(deflection), sp.eye(3)
     names = [sp.Dummy(real=True) for _ in x]
-    there = dict(zip(names, x, strict=True))
+    values = dict(zip(names, x, strict=True))
     of_names = deflection.xreplace(dict(zip(x, names, strict=True)))
-    along = [slope(of_names, name).xreplace(there) for name in names]
+    derivatives = [slope(of_names, name).xreplace(values) for name in names]
     turns = [turning_rate(deflection, rotation, units[:, k]) for k in range(3)]
     ways, pushed = sp.MatrixSymbol("E", n, 6), vector("push", n)
     steps = [
         Equation("deflection", vector("bent", n), deflection),
-        Equation("deflection by rates and turns", ways, sp.Matrix.hstack(*along, *turns)),
+        Equation("deflection by rates and turns", ways, sp.Matrix.hstack(*derivatives, *turns)),
         Equation("push along the deflection", pushed, push),
     ]
     return steps, _explicit(ways).T * _explicit(pushed)
 
 
 def wrench_guards(element: ForceElement) -> tuple[tuple[sp.Basic, int, str], ...]:
-    """The element's own condition, over the arrays of the kernel."""
+    """Condition stated by the element, in terms of the arrays of the kernel."""
     p = Symbols("p", tuple(x.name for x in element.parameters))
     _, arrays = relative_motion()
     condition = element.defined_within(_explicit(arrays[0]), _explicit(arrays[2]), p)

@@ -23,16 +23,16 @@ from ..definition.derivation import Derivation, Equation, Quantity, axial, vecto
 from ..definition.element import Hinge, Param, Symbols, describe_array
 from ..definition.nonsmooth_functions import slope
 
-#: Trigonometric entries with more operations than this are left as differentiation gave them.
+#: Trigonometric entries with more operations than this are not simplified.
 SIMPLIFY_LIMIT = 400
 
-#: Digits of H at a place, and those to which numbers are the same.
+#: Digits used to evaluate H numerically, and digits to which values must agree.
 _DIGITS, _SAME = 60, 40
 
 
 @dataclass(frozen=True)
 class HingePlace:
-    """Relative place of a hinge as SymPy matrices in the symbols q, p."""
+    """Relative position of a hinge as SymPy matrices in the symbols q, p."""
 
     hinge: Hinge
     q: Symbols
@@ -57,7 +57,7 @@ class HingeMotion(HingePlace):
     rates: sp.Matrix
 
     def in_arrays(self, matrix: sp.Matrix) -> sp.ImmutableDenseMatrix:
-        """The same matrix over the entries of the arrays q, u, p."""
+        """Matrix in terms of the entries of the arrays q, u, p."""
         replace: dict[sp.Basic, sp.Basic] = {}
         for name, symbols in (("q", self.q), ("u", self.u), ("p", self.p)):
             if len(symbols):
@@ -78,19 +78,19 @@ def speeds_of(hinge: Hinge) -> tuple[Param, ...]:
 
 @lru_cache(maxsize=32)
 def place_of(hinge: Hinge) -> HingePlace:
-    """Rotation and position as the definition states them; of these nothing is derived."""
+    """Rotation and position as defined, without derived quantities."""
     q = Symbols("q", tuple(c.name for c in hinge.coordinates))
     u = Symbols("u", tuple(s.name for s in speeds_of(hinge)))
     p = Symbols("p", tuple(x.name for x in hinge.parameters))
-    where = f"hinge {hinge.name}"
-    rotation = stated.matrix(where, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
-    position = stated.matrix(where, "position(q, p)", hinge.position, (3, 1), q, p)
+    location = f"hinge {hinge.name}"
+    rotation = stated.matrix(location, "rotation(q, p)", hinge.rotation, (3, 3), q, p)
+    position = stated.matrix(location, "position(q, p)", hinge.position, (3, 1), q, p)
     return HingePlace(hinge, q, u, p, rotation, position)
 
 
 @lru_cache(maxsize=32)
 def motion_of(hinge: Hinge) -> HingeMotion:
-    """Derive H and c, once for each definition.
+    """Relative motion of a hinge with derived H and c, cached by definition.
 
     Raises ElementError naming the equation that a definition contradicts.
     """
@@ -105,31 +105,33 @@ def motion_of(hinge: Hinge) -> HingeMotion:
 
 
 def moves_as(hinge: Hinge, subspace: sp.Matrix) -> bool:
-    """Whether H is this matrix of numbers, by what it is at two places, to forty digits: what is
-    to be derived need not be derived to be named."""
+    """Whether H equals this constant matrix, compared at two positions to forty digits.
+
+    The numerical comparison avoids deriving kernels that are only named.
+    """
     place = place_of(hinge)
     if (6, place.nu) != subspace.shape:
         return False
-    found = _subspace(place.rotation, place.position, _rates(place), place.q, place.u)
+    subspace_derived = _subspace(place.rotation, place.position, _rates(place), place.q, place.u)
     for denominator in (7, 11):
         symbols = (*place.q, *place.p)
-        there = {one: sp.Rational(k + 2, denominator) for k, one in enumerate(symbols)}
-        apart = (found - subspace).xreplace(there)
-        if any(abs(entry.evalf(_DIGITS)) > sp.Float(10) ** -_SAME for entry in apart):
+        sample = {variable: sp.Rational(k + 2, denominator) for k, variable in enumerate(symbols)}
+        difference = (subspace_derived - subspace).xreplace(sample)
+        if any(abs(entry.evalf(_DIGITS)) > sp.Float(10) ** -_SAME for entry in difference):
             return False
     return True
 
 
 def _rates(place: HingePlace) -> sp.Matrix:
-    hinge, q, u, where = place.hinge, place.q, place.u, f"hinge {place.hinge.name}"
-    rates = stated.optional(where, "rates(q, u, p)", hinge.rates, q, u, place.p)
+    hinge, q, u, location = place.hinge, place.q, place.u, f"hinge {place.hinge.name}"
+    rates = stated.optional(location, "rates(q, u, p)", hinge.rates, q, u, place.p)
     if rates is None and len(q) != len(u):
         raise ElementError(
-            f"{where}: {len(q)} coordinates but {len(u)} speeds; "
+            f"{location}: {len(q)} coordinates but {len(u)} speeds; "
             "state qdot = N(q) u in rates(q, u, p)"
         )
     given = sp.Matrix(list(u)) if rates is None else rates
-    return stated.matrix(where, "rates(q, u, p)", lambda: given, (len(q), 1))
+    return stated.matrix(location, "rates(q, u, p)", lambda: given, (len(q), 1))
 
 
 def _subspace(
@@ -137,7 +139,7 @@ def _subspace(
 ) -> sp.Matrix:
     columns = []
     for speed in u:
-        along = rates.diff(speed)  # coordinate rates when this speed alone is one
+        along = rates.diff(speed)  # coordinate rates for a unit value of this speed
         d_rotation, d_position = sp.zeros(3, 3), sp.zeros(3, 1)
         for coordinate, rate in zip(q, along, strict=True):
             d_rotation += slope(rotation, coordinate) * rate
@@ -168,14 +170,14 @@ def simplify_entry(entry: sp.Expr) -> sp.Expr:
     elif entry.count_ops() > SIMPLIFY_LIMIT:
         return entry
     elif any(not power.exp.is_integer for power in entry.atoms(sp.Pow)):
-        candidates = [entry, sp.factor_terms(entry)]  # under roots angles are collected too slowly
+        candidates = [entry, sp.factor_terms(entry)]  # collecting angles under roots is too slow
     else:
         candidates = [entry, sp.trigsimp(sp.expand(entry)), sp.factor_terms(entry)]
     return min(candidates, key=lambda e: (e.count_ops(), str(e)))
 
 
 def hinge_quantities(hinge: Hinge) -> tuple[Quantity, ...]:
-    """Inputs p, q, u of every hinge kernel (arrays of length zero are left out)."""
+    """Inputs p, q, u of every hinge kernel; arrays of length zero are left out."""
     groups = (
         ("p", "parameters", hinge.parameters),
         ("q", "coordinates", hinge.coordinates),
@@ -188,7 +190,7 @@ def hinge_quantities(hinge: Hinge) -> tuple[Quantity, ...]:
 
 
 def hinge_derivation(motion: HingeMotion) -> Derivation:
-    """The function every hinge offers: (p, q, u) -> R, d, H, v, w, c, qdot."""
+    """Kernel of every hinge: (p, q, u) -> R, d, H, v, w, c, qdot."""
     rows = (
         ("R", motion.rotation, "", "rotation, P axes to Q axes"),
         ("d", motion.position, "m", "position of P from Q, Q axes"),

@@ -1,14 +1,14 @@
-"""Elimination of a hinge's free coordinates, apart from the transport to the parent.
+"""Elimination of a hinge's free coordinates, separate from the transport to the parent.
 
 The sweep across a hinge is an elimination in the hinge's own axes followed by a transport.  Where
-the transport is done in stages (axial screws), the elimination stands alone:
+the transport is done in stages (axial screws), the elimination is a separate step:
 
     U = S H,  D = H^T U + J,  G = D^-1 U^T,  g = D^-1 (tau - H^T e)
     S_Q = S - U G,  e_Q = e + G^T (tau - H^T e)
 
-Along a unit direction of H without rotor inertia J three things hold identically and are declared
-instead of computed: the row and column of S_Q vanish, e_Q there is the effort tau, and the column
-of G there is a unit vector (G H = 1).
+Along a unit direction of H without rotor inertia J three identities are declared instead of
+computed: the row and column of S_Q vanish, e_Q there is the effort tau, and the column of G there
+is a unit vector (G H = 1).
 """
 
 from __future__ import annotations
@@ -30,8 +30,10 @@ def eliminate(
     name: str | None = None,
     rotor: sp.Expr | None = None,
 ) -> Derivation:
-    """G, g, S_Q, e_Q and the diagonal of D, for the speeds of `subspace`, of which one may have a
-    `rotor`, or of a given H with J."""
+    """G, g, S_Q, e_Q and the diagonal of D of a hinge.
+
+    For the speeds of `subspace`, of which one may have a `rotor`, or of a given H with J.
+    """
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
     h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
     given_rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
@@ -72,11 +74,11 @@ def eliminate(
         ),
         Equation("e_Q", REDUCED_E.symbol, replace_rows(symbol("e_full", 6), tau.symbol, units)),
     )
-    given = inputs if subspace is not None else (h_given, given_rotor)
+    extra_inputs = inputs if subspace is not None else (h_given, given_rotor)
     return Derivation(
         name or f"generic{nu}",
         f"elimination of a hinge with {free_speeds(nu)}",
-        (*given, S, E, tau),
+        (*extra_inputs, S, E, tau),
         (gain, offset, REDUCED_S, REDUCED_E, pivots),
         equations,
         sources=SOURCES,
@@ -84,7 +86,7 @@ def eliminate(
 
 
 def with_unit_columns(full: sp.MatrixSymbol, units: dict[int, int]) -> sp.ImmutableDenseMatrix:
-    """G with the columns along unit directions replaced by what they are."""
+    """G with unit vectors in the columns along unit directions."""
     return sp.ImmutableDenseMatrix(
         int(full.rows), 6, lambda i, j: sp.Integer(i == units[j]) if j in units else full[i, j]
     )

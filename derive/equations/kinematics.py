@@ -1,4 +1,4 @@
-"""Poses, velocities and end points: what loads, springs and results need beyond the sweep."""
+"""Poses, velocities and end points that loads, springs and results need beyond the sweep."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def pose() -> Derivation:
 
 
 def velocity() -> Derivation:
-    """Velocity of P, from the parent's and the hinge's own (body axes)."""
-    v_i, w_i, own = vector("v_I", 3), vector("w_I", 3), vector("v_rel", 3)
+    """Velocity of P from that of the parent and the relative velocity (body axes)."""
+    v_i, w_i, relative = vector("v_I", 3), vector("w_I", 3), vector("v_rel", 3)
     carried = R.symbol.T * (v_i + tilde(column(w_i)) * SHIFT.symbol)
     return Derivation(
         "frames",
@@ -43,10 +43,10 @@ def velocity() -> Derivation:
             SHIFT,
             Quantity(v_i, "m/s", "velocity of the parent's P, parent axes"),
             Quantity(w_i, "rad/s", "angular velocity of the parent, parent axes"),
-            Quantity(own, "m/s", "relative velocity of the hinge, body axes"),
+            Quantity(relative, "m/s", "relative velocity of the hinge, body axes"),
         ),
         (V,),
-        (Equation("velocity", V.symbol, carried + own),),
+        (Equation("velocity", V.symbol, carried + relative),),
     )
 
 
@@ -108,18 +108,18 @@ def turning() -> Derivation:
 
 def end_frame() -> Derivation:
     """Axes of an end of a body."""
-    own, axes = symbol("R_end", 3, 3), symbol("A_end", 3, 3)
+    local_axes, axes = symbol("R_end", 3, 3), symbol("A_end", 3, 3)
     return Derivation(
         "frames",
         "axes of an end",
-        (A, Quantity(own, "", "rotation, end axes to body axes")),
+        (A, Quantity(local_axes, "", "rotation, end axes to body axes")),
         (Quantity(axes, "", "rotation, end axes to inertial axes"),),
-        (Equation("axes of the end", axes, A.symbol * own),),
+        (Equation("axes of the end", axes, A.symbol * local_axes),),
     )
 
 
 def opposite() -> Derivation:
-    """What the F end of a massless element feels when T feels F and M."""
+    """Load on the F end of a massless element with the load F and M on T."""
     x_f, x_t, force, moment = (symbol(n, 3) for n in ("x_F", "x_T", "F", "M"))
     back, turn = symbol("F_back", 3), symbol("M_back", 3)
     return Derivation(
@@ -161,31 +161,33 @@ def power() -> Derivation:
 
 def carried_momentum() -> Derivation:
     """Momentum about P, body axes, carried to the inertial origin."""
-    own = Quantity(vector("h", 6), "N*s, N*m*s", "momentum, moment of momentum about P, body axes")
+    local = Quantity(
+        vector("h", 6), "N*s, N*m*s", "momentum, moment of momentum about P, body axes"
+    )
     push, turn = symbol("p", 3), symbol("L", 3)
-    moved = symbol("p_0", 3)
+    inertial = symbol("p_0", 3)
     return Derivation(
         "frames",
         "momentum about the inertial origin",
-        (A, X, own),
+        (A, X, local),
         (
             Quantity(push, "N*s", "momentum, inertial axes", accumulate=True),
             Quantity(turn, "N*m*s", "angular momentum about the inertial origin", accumulate=True),
         ),
         (
-            Equation("momentum, inertial axes", moved, A.symbol * part(own.symbol, 0)),
-            Equation("momentum", push, moved),
+            Equation("momentum, inertial axes", inertial, A.symbol * part(local.symbol, 0)),
+            Equation("momentum", push, inertial),
             Equation(
                 "angular momentum",
                 turn,
-                A.symbol * part(own.symbol, 3) + tilde(part(X.symbol, 0)) * moved,
+                A.symbol * part(local.symbol, 3) + tilde(part(X.symbol, 0)) * inertial,
             ),
         ),
     )
 
 
 def gravity_energy() -> Derivation:
-    """Potential of uniform gravity, zero at the inertial origin, from the body's mass matrix."""
+    """Potential of uniform gravity from the mass matrix, zero at the inertial origin."""
     mass_matrix = Quantity(symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
     gravity = Quantity(symbol("gravity", 3), "m/s2", "inertial axes")
     matrix, energy = mass_matrix.symbol, symbol("V", 1)
@@ -207,7 +209,7 @@ def gravity_energy() -> Derivation:
 
 
 def pivot_floor() -> Derivation:
-    """What a pivot of the sweep must exceed, from the mass matrix of the body that it moves."""
+    """Lower limit of a pivot from the mass matrix of the body that it moves."""
     mass_matrix = Quantity(symbol("S", 6, 6), "", "mass matrix at P", symmetric=True)
     return Derivation(
         "frames",
@@ -310,7 +312,7 @@ def moment_at() -> Derivation:
 
 
 def transport() -> Derivation:
-    """Load at P carried to P of the parent: what inverse dynamics sums up."""
+    """Load at P carried to P of the parent, as summed by inverse dynamics."""
     load = Quantity(symbol("e_I", 6), "N, N*m", "contribution to the parent", accumulate=True)
     push = symbol("push", 3)
     return Derivation(
@@ -346,20 +348,20 @@ def rotor_energy() -> Derivation:
 
 def driven_effort() -> Derivation:
     """Effort on one speed beyond a given one: tau_d = felt + J udot - tau."""
-    felt, inertia, rate, given, effort = (
+    load, inertia, rate, stated, effort = (
         symbol(name, 1) for name in ("felt", "J", "udot", "tau", "tau_d")
     )
     return Derivation(
         "frames",
         "effort that a prescribed acceleration needs",
         (
-            Quantity(felt, "N, N*m", "effort along the speed of the load at P, H^T f"),
+            Quantity(load, "N, N*m", "effort along the speed of the load at P, H^T f"),
             Quantity(inertia, "kg or kg*m2", "rotor inertia reflected to the speed"),
             Quantity(rate, "", "acceleration"),
-            Quantity(given, "N, N*m", "effort that is there already"),
+            Quantity(stated, "N, N*m", "effort that is there already"),
         ),
         (Quantity(effort, "N, N*m", "what is missing"),),
-        (Equation("tau_d", effort, felt + inertia * rate - given),),
+        (Equation("tau_d", effort, load + inertia * rate - stated),),
     )
 
 
@@ -376,11 +378,11 @@ def speed_power() -> Derivation:
 
 
 def length() -> Derivation:
-    """Distance of two points and its rate."""
+    """Distance between two points and its rate."""
     x_f, v_f, x_t, v_t = (symbol(n, 3) for n in ("x_F", "v_F", "x_T", "v_T"))
     between, rate, value = symbol("x_rel", 3), symbol("v_rel", 3), symbol("l", 2)
     distance = sp.sqrt(sum(between[i, 0] ** 2 for i in range(3)))
-    along = sum(between[i, 0] * rate[i, 0] for i in range(3)) / distance
+    rate_along = sum(between[i, 0] * rate[i, 0] for i in range(3)) / distance
     return Derivation(
         "frames",
         "distance of two points",
@@ -389,25 +391,25 @@ def length() -> Derivation:
         (
             Equation("relative position", between, x_t - x_f),
             Equation("relative velocity", rate, v_t - v_f),
-            Equation("distance and rate", value, sp.ImmutableDenseMatrix([distance, along])),
+            Equation("distance and rate", value, sp.ImmutableDenseMatrix([distance, rate_along])),
         ),
     )
 
 
 def turned() -> Derivation:
-    """A vector of a body in inertial axes."""
-    own, out = symbol("b", 3), symbol("b_0", 3)
+    """Vector of a body in inertial axes."""
+    local, out = symbol("b", 3), symbol("b_0", 3)
     return Derivation(
         "frames",
         "vector in inertial axes",
-        (A, Quantity(own, "", "body axes")),
+        (A, Quantity(local, "", "body axes")),
         (Quantity(out, "", "inertial axes"),),
-        (Equation("vector", out, A.symbol * own),),
+        (Equation("vector", out, A.symbol * local),),
     )
 
 
 def classical_body() -> Derivation:
-    """What the classical matrix of a rigid body takes, in inertial axes, from the swept data."""
+    """Inputs of the classical matrix of a rigid body, in inertial axes, from swept data."""
     p = Quantity(symbol("p", 10), "", "parameters of the rigid body")
     load = Quantity(symbol("load", 6), "N, N*m", "applied force and moment at P, body axes")
     out = Quantity(symbol("ro_n", 3), "m", "inboard point of the next hinge, body axes")
@@ -451,7 +453,7 @@ def classical_body() -> Derivation:
 
 
 def state_deviation() -> Derivation:
-    """Deviation of a body's acceleration from the bias motion, read from a classical state."""
+    """Deviation of a body's acceleration from the bias motion, from a classical state."""
     state = Quantity(symbol("z", 13), "", "[rdd; omegadot; m; q; 1] at P, inertial axes")
     delta = Quantity(symbol("delta", 6), "", "deviation of the body's acceleration")
     z, motion = state.symbol, MOTION.symbol

@@ -1,4 +1,4 @@
-"""Laws on hinge coordinates: springs, dampers, efforts, friction, limits; energies with them.
+"""Laws on hinge coordinates: springs, dampers, efforts, friction, limits; with energies.
 
 Every law returns the efforts tau, the stored energy V and the power P of what is not stored
 (dampers, friction, given efforts), with P = tau . u + dV/dt, so that energies can be balanced.
@@ -35,10 +35,10 @@ def coordinate_law(full: bool) -> Derivation:
     """
     names = LINEAR + (FRICTION + LIMITS if full else ())
     p = {name: vector("p", len(names))[i, 0] for i, name in enumerate(names)}
-    q, u, given = vector("q", 1)[0, 0], vector("u", 1)[0, 0], vector("effort", 1)[0, 0]
+    q, u, effort = vector("q", 1)[0, 0], vector("u", 1)[0, 0], vector("effort", 1)[0, 0]
     stretch = q - p["rest"]
     energy = p["stiffness"] * stretch**2 / 2
-    lost = given - p["damping"] * u
+    lost = effort - p["damping"] * u
     stored = -p["stiffness"] * stretch
     if full:
         lost += _friction(p, u)
@@ -80,7 +80,7 @@ def _friction(p: dict[str, sp.Expr], u: sp.Expr) -> sp.Expr:
 ROTATIONAL = ("kx", "ky", "kz", "rest_twist", "cx", "cy", "cz")
 
 
-def _swing_twist(
+def _swing_twist_law(
     quaternion: sp.Matrix, p: sp.MatrixSymbol, first: int, axes: sp.MatrixSymbol, spin: sp.Matrix
 ) -> tuple[list[Equation], sp.Matrix, sp.Expr, sp.Expr]:
     """(equations, torque in body axes, energy, lost power) of V(swing vector, twist).
@@ -109,21 +109,21 @@ def _swing_twist(
     rates = rate_of(sp.Matrix([w, x, y, z]), omega)
     torque = []
     for direction in omega:
-        along = rates.diff(direction)
+        rate_part = rates.diff(direction)
         change = sp.Integer(0)
-        for symbol, rate in zip((w, x, y, z), along, strict=True):
+        for symbol, rate in zip((w, x, y, z), rate_part, strict=True):
             change += (push[0, 0] * sx.diff(symbol) + push[1, 0] * sy.diff(symbol)) * rate
             change += push[2, 0] * twist_rate.get(symbol, 0) * rate
-        torque.append(-_named(change, swing, share, factor, slope).xreplace(arrays))
-    swings = [_named(s, swing, share, factor, slope).xreplace(arrays) for s in (sx, sy)]
+        torque.append(-_replace_function(change, swing, share, factor, slope).xreplace(arrays))
+    swings = [_replace_function(s, swing, share, factor, slope).xreplace(arrays) for s in (sx, sy)]
     damping = sp.Matrix([-c * s for c, s in zip((cx, cy, cz), spin, strict=True)])
     stiffness = sp.ImmutableDenseMatrix(sp.diag(kx, ky, kz))
     equations = [
         Equation(
             "quaternion in law axes", local, sp.ImmutableDenseMatrix([quaternion[0], *axial_part])
         ),
-        *_swing_function(share.xreplace(arrays), (outer / inner).xreplace(arrays), factor, slope),
-        Equation("unwrapped twist", twist, _unwrapped(local)),
+        *_swing_equations(share.xreplace(arrays), (outer / inner).xreplace(arrays), factor, slope),
+        Equation("unwrapped twist", twist, _unwrapped_twist(local)),
         Equation(
             "swing and twist, law axes",
             sigma,
@@ -135,14 +135,14 @@ def _swing_twist(
     return equations, frame * sp.Matrix(torque) + damping, energy, damping.dot(spin)
 
 
-def _named(
+def _replace_function(
     expression: sp.Expr,
     swing: sp.Function,
     share: sp.Expr,
     factor: sp.MatrixSymbol,
     slope: sp.MatrixSymbol,
 ) -> sp.Expr:
-    """Replace F(share) and its derivative by the values the kernel computes once."""
+    """Expression with F(share) and its derivative replaced by named values."""
     expression = expression.doit()
     for part in expression.atoms(sp.Subs):
         expression = expression.xreplace({part: slope[0, 0]})
@@ -151,10 +151,10 @@ def _named(
     return expression.xreplace({swing(share): factor[0, 0]})
 
 
-def _swing_function(
+def _swing_equations(
     share: sp.Expr, tangent_squared: sp.Expr, factor: sp.MatrixSymbol, slope: sp.MatrixSymbol
 ) -> list[Equation]:
-    """F(X) = swing angle / sin(half swing angle) for X = sin^2, and dF/dX; series near X = 0."""
+    """F(X) = swing angle / sin(half swing angle), X = sin^2, and dF/dX; series near X = 0."""
     x_symbol = sp.Symbol("X", nonnegative=True)
     root = sp.sqrt(share)
     half = sp.atan(sp.sqrt(tangent_squared))
@@ -181,7 +181,7 @@ def _swing_function(
     ]
 
 
-def _unwrapped(local: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+def _unwrapped_twist(local: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
     reference = vector("twist_ref", 1)[0, 0]
     wrapped = 2 * sp.atan2(local[3, 0], local[0, 0])
     turns = sp.floor((reference - wrapped) / (4 * sp.pi) + sp.Rational(1, 2))
@@ -189,13 +189,13 @@ def _unwrapped(local: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
 
 
 def rotation_law() -> Derivation:
-    """Law of a ball hinge: swing-twist potential, damping about outboard axes, given torques."""
+    """Law of a ball hinge: swing-twist potential, damping (outboard axes), given torques."""
     p, q, u = vector("p", 7), vector("q", 4), vector("u", 3)
-    axes, given = sp.MatrixSymbol("B", 3, 3), vector("effort", 3)
+    axes, effort = sp.MatrixSymbol("B", 3, 3), vector("effort", 3)
     spin = sp.Matrix([u[i, 0] for i in range(3)])
     quaternion = sp.Matrix([q[i, 0] for i in range(4)])
-    equations, torque, energy, lost = _swing_twist(quaternion, p, 0, axes, spin)
-    efforts = sp.Matrix([given[i, 0] for i in range(3)])
+    equations, torque, energy, lost = _swing_twist_law(quaternion, p, 0, axes, spin)
+    efforts = sp.Matrix([effort[i, 0] for i in range(3)])
     outputs = (
         (vector("tau", 3), torque + efforts),
         (V.symbol, sp.Matrix([energy])),
@@ -210,7 +210,7 @@ def rotation_law() -> Derivation:
             Quantity(q, "", "unit quaternion"),
             Quantity(u, "rad/s", "angular velocity, outboard axes"),
             Quantity(axes, "", "rotation, law axes to hinge axes"),
-            Quantity(given, "N*m", "given torques, outboard axes"),
+            Quantity(effort, "N*m", "given torques, outboard axes"),
             _scalar("twist_ref", "rad", "twist at the last accepted step"),
         ),
         (
@@ -228,20 +228,20 @@ SIX = ("kx", "ky", "kz", "rest_x", "rest_y", "rest_z", "cx", "cy", "cz", *ROTATI
 
 
 def six_direction_law() -> Derivation:
-    """Law of a free or elastic hinge: V = d^T K d/2 in inboard hinge axes plus swing and twist."""
+    """Law of a free or elastic hinge: V = d^T K d/2 in inboard axes plus swing and twist."""
     p, q, u = vector("p", len(SIX)), vector("q", 7), vector("u", 6)
     axes, given = sp.MatrixSymbol("B", 3, 3), vector("effort", 6)
     spin = sp.Matrix([u[i, 0] for i in range(3, 6)])
     quaternion = sp.Matrix([q[i, 0] for i in range(3, 7)])
-    equations, torque, energy, lost = _swing_twist(quaternion, p, 9, axes, spin)
+    equations, torque, energy, lost = _swing_twist_law(quaternion, p, 9, axes, spin)
     rotation, d_rate = sp.MatrixSymbol("R", 3, 3), vector("law_rate", 3)
-    turned = sp.Matrix(3, 3, lambda i, j: rotation[i, j])
+    rotation_entries = sp.Matrix(3, 3, lambda i, j: rotation[i, j])
     stretch = sp.Matrix([q[i, 0] - p[3 + i, 0] for i in range(3)])
     rate = sp.Matrix([d_rate[i, 0] for i in range(3)])
     spring = sp.Matrix([-p[i, 0] * stretch[i] for i in range(3)])
     damper = sp.Matrix([-p[6 + i, 0] * rate[i] for i in range(3)])
     energy += sum(p[i, 0] * stretch[i] ** 2 for i in range(3)) / 2
-    force = turned.T * (spring + damper)
+    force = rotation_entries.T * (spring + damper)
     efforts = sp.Matrix([given[i, 0] for i in range(6)])
     tau = sp.Matrix.vstack(force, torque) + efforts
     speeds = sp.Matrix([u[i, 0] for i in range(6)])
@@ -249,7 +249,9 @@ def six_direction_law() -> Derivation:
     power = lost + damper.dot(rate) + efforts.dot(speeds)
     equations += [
         Equation("rotation", rotation, sp.ImmutableDenseMatrix(rotation_of(*quaternion))),
-        Equation("rate of d in hinge axes", d_rate, sp.ImmutableDenseMatrix(turned * velocity)),
+        Equation(
+            "rate of d in hinge axes", d_rate, sp.ImmutableDenseMatrix(rotation_entries * velocity)
+        ),
         Equation("efforts", vector("tau", 6), sp.ImmutableDenseMatrix(tau)),
         Equation("stored energy", V.symbol, sp.ImmutableDenseMatrix([energy])),
         Equation("lost power", POWER.symbol, sp.ImmutableDenseMatrix([power])),

@@ -1,16 +1,16 @@
-"""Elimination of a hinge's free coordinates without back-substitution, and the way back from it.
+"""Elimination of a hinge's free coordinates without back-substitution, and recovery.
 
-Of D = L diag(d) L^T the sweep towards the root needs L^-1 alone; L^-T waits until the accelerations
-are recovered, where one column takes it instead of seven.  With the notation of `eliminate`:
+With D = L diag(d) L^T the backward pass only needs L^-1; L^-T is applied when accelerations are
+recovered, to one column instead of seven.  With the notation of `eliminate`:
 
     Y = L^-1 U^T,  Z = diag(d)^-1 Y,  y = L^-1 (tau - H^T e)
     S_Q = S - Y^T Z,  e_Q = e + Z^T y
     udot = L^-T (diag(d)^-1 y - Z a_Q)
 
-Along a unit direction of H without rotor inertia J three things hold identically and are declared
-instead of computed: the row and column of S_Q vanish, e_Q there is the effort tau, and as Z H = L^T
-the share of a_Q along it goes through to udot: udot = v - W a_Q with v = L^-T (...) over the other
-directions alone, W the unit columns of H transposed.
+Along a unit direction of H without rotor inertia J three identities are declared instead of
+computed: the row and column of S_Q vanish, e_Q there is the effort tau, and as Z H = L^T the
+component of a_Q along it passes unchanged to udot: udot = v - W a_Q with v = L^-T (...) over the
+other directions only, W the unit columns of H transposed.
 """
 
 from __future__ import annotations
@@ -50,9 +50,10 @@ def eliminate_factored(
     inputs: tuple[Quantity, ...] = (),
     name: str | None = None,
 ) -> Derivation:
-    """F, Z, z, W, S_Q, e_Q and the diagonal of D, for the speeds of `subspace` or a given H with J.
+    """F, Z, z, W, S_Q, e_Q and the diagonal of D of a hinge.
 
-    With a given H no direction is known to be a unit one: W = 0.
+    For the speeds of `subspace` or a given H with J.  With a given H no direction is known to
+    be a unit direction: W = 0.
     """
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
     h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
@@ -77,7 +78,7 @@ def eliminate_factored(
         Equation("Y = L^-1 U^T", full, Triangular(factor.symbol, push.T)),
         Equation("diag(d)^-1 Y", scaled, divide_rows(full, factor.symbol)),
         Equation("Z, without unit directions", gain.symbol, _without_columns(scaled, units)),
-        Equation("unit directions", through.symbol, _through(nu, units)),
+        Equation("unit directions", through.symbol, _unit_rows(nu, units)),
         Equation("y = L^-1 (tau - H^T e)", surplus, Triangular(factor.symbol, right)),
         Equation("diag(d)^-1 y", offset.symbol, divide_rows(surplus, factor.symbol)),
         Equation(
@@ -90,11 +91,11 @@ def eliminate_factored(
         Equation("e + Z^T y", e_full, E.symbol + scaled.T * surplus),
         Equation("e_Q", REDUCED_E.symbol, replace_rows(e_full, tau.symbol, units)),
     )
-    given = inputs if subspace is not None else (h_given, rotor)
+    extra_inputs = inputs if subspace is not None else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
         f"elimination of a hinge with {free_speeds(nu)}",
-        (*given, S, E, tau),
+        (*extra_inputs, S, E, tau),
         (factor, gain, offset, through, REDUCED_S, REDUCED_E, pivots),
         equations,
         sources=SOURCES,
@@ -102,24 +103,24 @@ def eliminate_factored(
 
 
 def recover_factored(nu: int) -> Derivation:
-    """udot = v - W X delta_I and the body's own deviation X delta_I + H udot.
+    """udot = v - W X delta_I, and the deviation X delta_I + H udot of the body.
 
     v = L^-T (z - Z X delta_I).  Along unit directions the deviation is v itself.
     """
     factor, gain, offset, through = _gains(nu)
     h = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
-    carried, known, v = symbol("delta_Q", 6), symbol("a_W", nu), symbol("v", nu)
-    rest = offset.symbol - gain.symbol * carried
+    carried, along_units, v = symbol("delta_Q", 6), symbol("a_W", nu), symbol("v", nu)
+    right_side = offset.symbol - gain.symbol * carried
     equations = (
         Equation("X delta_I", carried, outboard_deviation()),
-        Equation("W X delta_I", known, through.symbol * carried),
-        Equation("v", v, Triangular(factor.symbol, rest, transposed=True)),
-        Equation("udot = v - W X delta_I", rates.symbol, v - known),
+        Equation("W X delta_I", along_units, through.symbol * carried),
+        Equation("v", v, Triangular(factor.symbol, right_side, transposed=True)),
+        Equation("udot = v - W X delta_I", rates.symbol, v - along_units),
         Equation(
             "deviation of the body",
             DELTA.symbol,
-            (carried - h.symbol * known) + h.symbol * v,
+            (carried - h.symbol * along_units) + h.symbol * v,
         ),
     )
     return Derivation(
@@ -145,5 +146,5 @@ def _without_columns(full: sp.MatrixSymbol, columns: dict[int, int]) -> sp.Immut
     )
 
 
-def _through(nu: int, units: dict[int, int]) -> sp.ImmutableDenseMatrix:
+def _unit_rows(nu: int, units: dict[int, int]) -> sp.ImmutableDenseMatrix:
     return sp.ImmutableDenseMatrix(nu, 6, lambda k, j: sp.Integer(units.get(j) == k))

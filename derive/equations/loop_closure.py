@@ -1,12 +1,12 @@
-"""Closed loops: the rows of a hinge that closes one, and their multipliers through the sweep.
+"""Closed loops: rows of a cut hinge, and their multipliers in the sweep.
 
-A hinge whose outboard body B is held by another one already is cut: it stands behind its inboard
-body A with the kernels of any hinge, and where it ends a frame C without mass.  What the frames C
-and B, at the end that the hinge holds, do relative to each other are six directions; W parts them
-(`complement`) into the hinge's own speeds and the rows that it holds, which close the loop.
+A hinge is cut if another hinge already supports its outboard body B: it is attached to its inboard
+body A with the kernels of any hinge, and ends at a massless frame C.  The relative motion of the
+frames C and B (at the hinge's end) has six directions; W splits them (`complement`) into the
+hinge's own speeds and the constrained rows, which close the loop.
 
-With d from C to B in axes of C, everything is told so that it does not change when A and B move
-together, even while d is not zero:
+With d from C to B in axes of C, all quantities are invariant under a common motion of A and B, even
+while d is not zero:
 
     gap    [d; 2 sin(angle / 2) n]
     slip   [d'; w_r],  w_r = w_B - w_C
@@ -15,11 +15,12 @@ together, even while d is not zero:
 Rows carry multipliers x through the sweep (Vereshchagin, Engng. Cybern. 6 (1974) 1343-1349).  With
 f = S a + e + K x between any two elements, and the rows summed up so far c = K^T a - L x + l, all
 of it the stationary point of  1/2 a^T S a + e^T a + x^T K^T a - 1/2 x^T L x + x^T l,  a column of K
-goes across a hinge as e does, and leaves
+is carried across a hinge like e, and leaves
 
     y_j = -H^T K_j - C_j,  z_j = D^-1 y_j,  L_ij += y_i . z_j,  l_j -= z_j . (tau - H^T e)
 
-where C is what a row has of the hinge's own speeds.  Where the ends of row r meet it is closed:
+where C is the part of a row in the hinge's own speeds.  On the body where both ends of row r are
+outboard, it is closed:
 
     x_r = (K_r^T a + l_r - sum_p L_rp x_p) / L_rr
     S += K_r K_r^T / L_rr,  e += K_r l_r / L_rr
@@ -41,7 +42,7 @@ SOURCES = (
     "Featherstone, Rigid Body Dynamics Algorithms, Springer 2008, ch. 8 (closed loops)",
 )
 
-#: Least of 1 + trace of a rotation, which vanishes for half a turn.
+#: Least value of 1 + trace of a rotation, which vanishes for half a turn.
 _HALF_TURN = sp.Rational(1, 10**12)
 
 TURN = Quantity(symbol("R_C", 3, 3), "", "rotation, axes of C to axes of B")
@@ -56,7 +57,7 @@ BIAS = Quantity(symbol("l", 6), "", "rows of what is known")
 
 
 def meet() -> Derivation:
-    """Where the end of B is, seen from C and from A."""
+    """Position of the end of B, from C and from A."""
     a_c, x_c = symbol("A_C", 3, 3), symbol("x_C", 3)
     a_b, x_b = symbol("A_B", 3, 3), symbol("x_B", 3)
     return Derivation(
@@ -80,27 +81,27 @@ def meet() -> Derivation:
 
 
 def gap() -> Derivation:
-    """How far the end of B and C are apart."""
-    own, apart, whole = symbol("R_e", 3, 3), symbol("gap", 6), symbol("R_rel", 3, 3)
-    trace = whole[0, 0] + whole[1, 1] + whole[2, 2]
+    """Position and orientation error between the end of B and C."""
+    closed_axes, error, relative = symbol("R_e", 3, 3), symbol("gap", 6), symbol("R_rel", 3, 3)
+    trace = relative[0, 0] + relative[1, 1] + relative[2, 2]
     half = sp.sqrt(sp.Max(1 + trace, _HALF_TURN))
-    turned = sp.ImmutableDenseMatrix([2 * entry / half for entry in axial(whole)])
+    angle_error = sp.ImmutableDenseMatrix([2 * entry / half for entry in axial(relative)])
     return Derivation(
         "loops",
         "gap of a hinge that closes a loop",
-        (Quantity(own, "", "rotation, axes of C to axes of B where the loop is closed"), TURN,
-         APART),
-        (Quantity(apart, "m, rad", "gap, axes of C"),),
+        (Quantity(closed_axes, "", "rotation, axes of C to axes of B where the loop is closed"),
+         TURN, APART),
+        (Quantity(error, "m, rad", "gap, axes of C"),),
         (
-            Equation("rotation of the end of B against C", whole, TURN.symbol.T * own),
-            Equation("gap", apart, stack(column(APART.symbol), turned)),
+            Equation("rotation of the end of B against C", relative, TURN.symbol.T * closed_axes),
+            Equation("gap", error, stack(column(APART.symbol), angle_error)),
         ),
         sources=SOURCES,
     )  # fmt: skip
 
 
 def slip() -> Derivation:
-    """How fast the end of B moves relative to C."""
+    """Velocity of the end of B relative to C."""
     v_c, w_c, v_b, w_b = (symbol(name, 3) for name in ("v_C", "w_C", "v_B", "w_B"))
     end = v_b + tilde(column(w_b)) * END.symbol
     linear = TURN.symbol.T * end - v_c - tilde(column(w_c)) * APART.symbol
@@ -127,7 +128,7 @@ def drift() -> Derivation:
         Quantity(symbol(f"motion_{name}", 9), "", f"bias motion of {name}: w, wd, rdd, own axes")
         for name in "CB"
     )
-    found = Quantity(symbol("drift", 6), "", "rate of the slip in the bias motion, axes of C")
+    result = Quantity(symbol("drift", 6), "", "rate of the slip in the bias motion, axes of C")
     w_c, wd_c, rdd_c = (part(of_c.symbol, k) for k in (0, 3, 6))
     w_b, wd_b, rdd_b = (part(of_b.symbol, k) for k in (0, 3, 6))
     end = rdd_b + tilde(wd_b) * END.symbol + tilde(w_b) * (tilde(w_b) * END.symbol)
@@ -138,19 +139,21 @@ def drift() -> Derivation:
         "loops",
         "drift of a hinge that closes a loop",
         (TURN, END, APART, SLIP, of_c, of_b),
-        (found,),
-        (Equation("drift", found.symbol, stack(linear, angular)),),
+        (result,),
+        (Equation("drift", result.symbol, stack(linear, angular)),),
         sources=SOURCES,
     )
 
 
 def closing() -> Derivation:
-    """relative = rate gap: what the end of B would have to be accelerated by so that its gap were
-    gone at the end of a step; 1 / rate is what accelerations change coordinates by (M. Arnold,
-    O. Brüls, Multibody Syst. Dyn. 18 (2007) 185-202)."""
+    """relative = rate gap: acceleration of the end of B that closes its gap within a step.
+
+    1 / rate converts accelerations to changes of coordinates (M. Arnold, O. Brüls, Multibody
+    Syst. Dyn. 18 (2007) 185-202).
+    """
     gap = Quantity(symbol("gap", 6), "", "gap, axes of C")
     rate = Quantity(symbol("rate", 1), "1/s^2", "accelerations by changes of coordinates")
-    value = _times(rate.symbol[0, 0], gap.symbol)
+    value = _scale_vector(rate.symbol[0, 0], gap.symbol)
     return Derivation(
         "loops",
         "accelerations that close a gap in a step",
@@ -162,20 +165,20 @@ def closing() -> Derivation:
 
 
 def row() -> Derivation:
-    """The row of one direction, by the accelerations of A and of B.
+    """Row of one direction, by the accelerations of A and of B.
 
     A row is a load of C on B as well, and its reaction on A where B is; so its columns are loads,
     carried to P of either.
     """
-    along = Quantity(symbol("w", 6), "", "the direction: a row of W")
-    force = sp.ImmutableDenseMatrix([along.symbol[i, 0] for i in range(3)])
-    moment = sp.ImmutableDenseMatrix([along.symbol[i, 0] for i in range(3, 6)])
-    outboard = _carried(TURN.symbol, END.symbol, force, moment)
-    inboard = _carried(R.symbol, LEVER.symbol, -force, -moment)
+    direction = Quantity(symbol("w", 6), "", "the direction: a row of W")
+    force = sp.ImmutableDenseMatrix([direction.symbol[i, 0] for i in range(3)])
+    moment = sp.ImmutableDenseMatrix([direction.symbol[i, 0] for i in range(3, 6)])
+    outboard = _carried_load(TURN.symbol, END.symbol, force, moment)
+    inboard = _carried_load(R.symbol, LEVER.symbol, -force, -moment)
     return Derivation(
         "loops",
         "row of a direction of a hinge that closes a loop",
-        (along, TURN, END, R, LEVER),
+        (direction, TURN, END, R, LEVER),
         (INBOARD_ROW, OUTBOARD_ROW),
         (
             Equation("J_A", INBOARD_ROW.symbol, sp.ImmutableDenseMatrix(inboard)),
@@ -186,7 +189,7 @@ def row() -> Derivation:
 
 
 def known() -> Derivation:
-    """What is known of all six directions."""
+    """Known parts of all six directions."""
     return Derivation(
         "loops",
         "known parts of the rows of a hinge that closes a loop",
@@ -197,45 +200,47 @@ def known() -> Derivation:
     )
 
 
-def _carried(
+def _carried_load(
     rotation: sp.MatrixSymbol, lever: sp.MatrixSymbol, force: sp.MatrixBase, moment: sp.MatrixBase
 ) -> list[sp.Expr]:
     """Entries of a load in other axes, about another point."""
-    turned = [sum(rotation[i, j] * force[j, 0] for j in range(3)) for i in range(3)]
-    about = tilde(column(lever)) * sp.ImmutableDenseMatrix(turned)
+    force_entries = [sum(rotation[i, j] * force[j, 0] for j in range(3)) for i in range(3)]
+    about = tilde(column(lever)) * sp.ImmutableDenseMatrix(force_entries)
     return [
-        *turned,
+        *force_entries,
         *(sum(rotation[i, j] * moment[j, 0] for j in range(3)) + about[i, 0] for i in range(3)),
     ]
 
 
 def told() -> Derivation:
-    """l + J_A delta_A + J_B delta_B: what a direction does in the motion that was found."""
+    """l + J_A delta_A + J_B delta_B: acceleration along a row in the computed motion."""
     of_a, of_b = (
         Quantity(symbol(f"delta_{name}", 6), "", f"deviation of the acceleration of {name}")
         for name in "AB"
     )
     of_row = Quantity(symbol("l", 1), "", "row of what is known")
-    found = Quantity(symbol("c", 1), "", "acceleration along the direction")
+    result = Quantity(symbol("c", 1), "", "acceleration along the direction")
     value = of_row.symbol + INBOARD_ROW.symbol.T * of_a.symbol + OUTBOARD_ROW.symbol.T * of_b.symbol
     return Derivation(
         "loops",
         "acceleration along a direction of a hinge that closes a loop",
         (INBOARD_ROW, OUTBOARD_ROW, of_row, of_a, of_b),
-        (found,),
-        (Equation("c", found.symbol, value),),
+        (result,),
+        (Equation("c", result.symbol, value),),
         sources=SOURCES,
     )
 
 
 def act() -> Derivation:
-    """e -= J tau: a load given by an effort, added to what a body must be held with."""
-    along = Quantity(symbol("J", 6), "", "load of an effort of one")
+    """e -= J tau: load of an effort on a body."""
+    direction = Quantity(symbol("J", 6), "", "load of an effort of one")
     effort = Quantity(symbol("tau", 1), "N, N*m", "effort")
     load = Quantity(symbol("e", 6), "N, N*m", "force part of f = S a + e", accumulate=True)
-    value = sp.ImmutableDenseMatrix([-along.symbol[i, 0] * effort.symbol[0, 0] for i in range(6)])
+    value = sp.ImmutableDenseMatrix(
+        [-direction.symbol[i, 0] * effort.symbol[0, 0] for i in range(6)]
+    )
     return Derivation(
-        "loops", "load of an effort", (along, effort), (load,),
+        "loops", "load of an effort", (direction, effort), (load,),
         (Equation("e -= J tau", load.symbol, value),), sources=SOURCES,
     )  # fmt: skip
 
@@ -250,29 +255,30 @@ COUPLING = Quantity(symbol("L_p", 1), "", "entry of L of the row that closes and
 MULTIPLIER = Quantity(symbol("x", 1), "N, N*m", "multiplier")
 
 
-def _more(name: str, rows: int = 1, said: str = "") -> Quantity:
-    return Quantity(symbol(name, rows), "", said, accumulate=True)
+def _accumulated(name: str, rows: int = 1, meaning: str = "") -> Quantity:
+    return Quantity(symbol(name, rows), "", meaning, accumulate=True)
 
 
 def settle() -> Derivation:
-    """1 / L_rr of the row r that closes.
+    """1 / L_rr of the closing row r.
 
     A pivot below `floor` stands for rounding: what moves the row is held already, and the row goes
     without a multiplier.
     """
     floor = Quantity(symbol("floor", 1), "", "largest pivot that is rounding")
     pivot = PIVOT.symbol[0, 0]
-    held = sp.Piecewise((1 / pivot, pivot > floor.symbol[0, 0]), (0, True))
+    reciprocal = sp.Piecewise((1 / pivot, pivot > floor.symbol[0, 0]), (0, True))
     return Derivation(
         "loops", "pivot of a row that closes", (PIVOT, floor), (INVERSE,),
-        (Equation("1 / L_rr", INVERSE.symbol, sp.ImmutableDenseMatrix([held])),), sources=SOURCES,
+        (Equation("1 / L_rr", INVERSE.symbol, sp.ImmutableDenseMatrix([reciprocal])),),
+        sources=SOURCES,
     )  # fmt: skip
 
 
 def close() -> Derivation:
-    """Row r closed on the body where its ends meet."""
+    """Close row r on the body where its ends meet."""
     mass = Quantity(symbol("S", 6, 6), "", "S of the body", symmetric=True, accumulate=True)
-    load = _more("e", 6, "e of the body")
+    load = _accumulated("e", 6, "e of the body")
     k, inverse, scaled = COLUMN.symbol, INVERSE.symbol[0, 0], symbol("K_d", 6)
     return Derivation(
         "loops",
@@ -280,46 +286,46 @@ def close() -> Derivation:
         (INVERSE, COLUMN, KNOWN),
         (mass, load),
         (
-            Equation("K_r / L_rr", scaled, _times(inverse, k)),
+            Equation("K_r / L_rr", scaled, _scale_vector(inverse, k)),
             Equation("S += K_r K_r^T / L_rr", mass.symbol, scaled * k.T, symmetric=True),
-            Equation("e += K_r l_r / L_rr", load.symbol, _times(KNOWN.symbol[0, 0], scaled)),
+            Equation("e += K_r l_r / L_rr", load.symbol, _scale_vector(KNOWN.symbol[0, 0], scaled)),
         ),
         sources=SOURCES,
     )
 
 
-def _times(factor: sp.Expr, vector: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+def _scale_vector(factor: sp.Expr, vector: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
     return sp.ImmutableDenseMatrix([factor * vector[i, 0] for i in range(int(vector.rows))])
 
 
 def shed() -> Derivation:
-    """Column of a row p that stays, as row r is closed."""
-    other = _more("K_p", 6, "column of row p")
+    """Column of an open row p after row r is closed."""
+    column_p = _accumulated("K_p", 6, "column of row p")
     share = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0]
     return Derivation(
         "loops", "column of a row that stays while another is closed",
-        (INVERSE, COLUMN, COUPLING), (other,),
-        (Equation("K_p -= K_r L_rp / L_rr", other.symbol, _times(share, COLUMN.symbol)),),
+        (INVERSE, COLUMN, COUPLING), (column_p,),
+        (Equation("K_p -= K_r L_rp / L_rr", column_p.symbol, _scale_vector(share, COLUMN.symbol)),),
         sources=SOURCES,
     )  # fmt: skip
 
 
 def shed_known() -> Derivation:
-    """Known part of a row p that stays, as row r is closed."""
-    other = _more("l_p", 1, "known part of row p")
+    """Known part of an open row p after row r is closed."""
+    known_p = _accumulated("l_p", 1, "known part of row p")
     value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * KNOWN.symbol[0, 0]
     return Derivation(
         "loops", "known part of a row that stays while another is closed",
-        (INVERSE, KNOWN, COUPLING), (other,),
-        (Equation("l_p -= l_r L_rp / L_rr", other.symbol, sp.ImmutableDenseMatrix([value])),),
+        (INVERSE, KNOWN, COUPLING), (known_p,),
+        (Equation("l_p -= l_r L_rp / L_rr", known_p.symbol, sp.ImmutableDenseMatrix([value])),),
         sources=SOURCES,
     )  # fmt: skip
 
 
 def shed_pair() -> Derivation:
-    """Entry of L of two rows that stay, as row r is closed."""
+    """Entry of L of two open rows after row r is closed."""
     second = Quantity(symbol("L_q", 1), "", "entry of L of the row that closes and the second")
-    entry = _more("L_pq", 1, "entry of L of both")
+    entry = _accumulated("L_pq", 1, "entry of L of both")
     value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * second.symbol[0, 0]
     return Derivation(
         "loops", "two rows that stay while another is closed", (INVERSE, COUPLING, second),
@@ -330,8 +336,7 @@ def shed_pair() -> Derivation:
 
 
 def multiplier() -> Derivation:
-    """x_r at the ground, which keeps to its bias motion, but for the rows that were left when it
-    was closed."""
+    """x_r at the ground, whose deviation is zero, without the rows that were open then."""
     return Derivation(
         "loops", "multiplier of a row", (INVERSE, KNOWN), (MULTIPLIER,),
         (Equation("x_r", MULTIPLIER.symbol, INVERSE.symbol * KNOWN.symbol),), sources=SOURCES,
@@ -339,50 +344,51 @@ def multiplier() -> Derivation:
 
 
 def multiplier_more() -> Derivation:
-    """The share of the body where the row closes."""
+    """Contribution of the body where the row closes."""
     delta = Quantity(symbol("delta", 6), "", "deviation of the acceleration of the body")
-    found = _more("x", 1, "multiplier of row r")
+    result = _accumulated("x", 1, "multiplier of row r")
     return Derivation(
-        "loops", "share of a motion in a multiplier", (INVERSE, COLUMN, delta), (found,),
+        "loops", "share of a motion in a multiplier", (INVERSE, COLUMN, delta), (result,),
         (Equation(
-            "x_r += K_r^T a / L_rr", found.symbol, INVERSE.symbol * (COLUMN.symbol.T * delta.symbol)
+            "x_r += K_r^T a / L_rr", result.symbol,
+            INVERSE.symbol * (COLUMN.symbol.T * delta.symbol),
         ),),
         sources=SOURCES,
     )  # fmt: skip
 
 
 def multiplier_less() -> Derivation:
-    """The share of a row p that was left."""
-    other = Quantity(symbol("x_p", 1), "N, N*m", "multiplier of row p")
-    found = _more("x", 1, "multiplier of row r")
-    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * other.symbol[0, 0]
+    """Contribution of a row p that was open then."""
+    multiplier_p = Quantity(symbol("x_p", 1), "N, N*m", "multiplier of row p")
+    result = _accumulated("x", 1, "multiplier of row r")
+    value = -INVERSE.symbol[0, 0] * COUPLING.symbol[0, 0] * multiplier_p.symbol[0, 0]
     return Derivation(
-        "loops", "share of another row in a multiplier", (INVERSE, COUPLING, other), (found,),
-        (Equation("x_r -= L_rp x_p / L_rr", found.symbol, sp.ImmutableDenseMatrix([value])),),
+        "loops", "share of another row in a multiplier", (INVERSE, COUPLING, multiplier_p),
+        (result,),
+        (Equation("x_r -= L_rp x_p / L_rr", result.symbol, sp.ImmutableDenseMatrix([value])),),
         sources=SOURCES,
     )  # fmt: skip
 
 
 def yielded() -> Derivation:
-    """l += s - x / J: what an acceleration and a multiplier that are known leave of a rotor's row,
-    s = x / J."""
+    """l += s - x / J: residual of a rotor's row s = x / J at known s and x."""
     soft = Quantity(symbol("softness", 1), "", "1 / J of the rotor on the row")
-    given = Quantity(symbol("s", 1), "", "acceleration of the speed that it turns with")
-    known = _more("l", 1, "known part of the row")
-    value = given.symbol[0, 0] - soft.symbol[0, 0] * MULTIPLIER.symbol[0, 0]
+    acceleration = Quantity(symbol("s", 1), "", "acceleration of the speed that it turns with")
+    known = _accumulated("l", 1, "known part of the row")
+    value = acceleration.symbol[0, 0] - soft.symbol[0, 0] * MULTIPLIER.symbol[0, 0]
     return Derivation(
-        "loops", "the row of a rotor with a multiplier", (soft, given, MULTIPLIER), (known,),
+        "loops", "the row of a rotor with a multiplier", (soft, acceleration, MULTIPLIER), (known,),
         (Equation("l += s - x / J", known.symbol, sp.ImmutableDenseMatrix([value])),),
         sources=SOURCES,
     )  # fmt: skip
 
 
 def loaded() -> Derivation:
-    """e += K x: the load with multipliers that are known."""
-    load = _more("e", 6, "e of the body")
+    """e += K x: load of known multipliers."""
+    load = _accumulated("e", 6, "e of the body")
     return Derivation(
         "loops", "load of a multiplier", (COLUMN, MULTIPLIER), (load,),
-        (Equation("e += K x", load.symbol, _times(MULTIPLIER.symbol[0, 0], COLUMN.symbol)),),
+        (Equation("e += K x", load.symbol, _scale_vector(MULTIPLIER.symbol[0, 0], COLUMN.symbol)),),
         sources=SOURCES,
     )  # fmt: skip
 
@@ -390,14 +396,14 @@ def loaded() -> Derivation:
 # --- across a hinge -------------------------------------------------------------------------------
 
 
-def _of_speeds(name: str, nu: int, said: str) -> Quantity:
-    return Quantity(symbol(name, nu), "", said)
+def _speed_quantity(name: str, nu: int, meaning: str) -> Quantity:
+    return Quantity(symbol(name, nu), "", meaning)
 
 
 def divide(nu: int) -> Derivation:
     """z = D^-1 y of a column."""
     factor = Quantity(symbol("F", nu, nu), "", "D = L diag(d) L^T: L, and 1 / d on the diagonal")
-    y, z = _of_speeds("y", nu, "-H^T K - C"), _of_speeds("z", nu, "D^-1 y")
+    y, z = _speed_quantity("y", nu, "-H^T K - C"), _speed_quantity("z", nu, "D^-1 y")
     below = symbol("z_L", nu)
     return Derivation(
         f"generic{nu}",
@@ -417,8 +423,8 @@ def divide(nu: int) -> Derivation:
 
 def couple(nu: int) -> Derivation:
     """L_ij += y_i . z_j."""
-    y, z = _of_speeds("y", nu, "of one row"), _of_speeds("z", nu, "of the other")
-    entry = _more("L_ij", 1, "entry of L of both")
+    y, z = _speed_quantity("y", nu, "of one row"), _speed_quantity("z", nu, "of the other")
+    entry = _accumulated("L_ij", 1, "entry of L of both")
     return Derivation(
         f"generic{nu}", f"two columns coupled by a hinge with {nu} speeds", (y, z), (entry,),
         (Equation("L_ij += y_i . z_j", entry.symbol, y.symbol.T * z.symbol),), sources=SOURCES,
@@ -427,8 +433,8 @@ def couple(nu: int) -> Derivation:
 
 def answered(nu: int) -> Derivation:
     """l_j -= z_j . (tau - H^T e)."""
-    y, z = _of_speeds("y", nu, "tau - H^T e"), _of_speeds("z", nu, "of the row")
-    known = _more("l", 1, "known part of the row")
+    y, z = _speed_quantity("y", nu, "tau - H^T e"), _speed_quantity("z", nu, "of the row")
+    known = _accumulated("l", 1, "known part of the row")
     return Derivation(
         f"generic{nu}", f"what a hinge with {nu} speeds tells a row", (y, z), (known,),
         (Equation("l_j -= z_j . y", known.symbol, -(y.symbol.T * z.symbol)),), sources=SOURCES,
@@ -436,17 +442,19 @@ def answered(nu: int) -> Derivation:
 
 
 def pull(nu: int) -> Derivation:
-    """tau - H^T e with the multiplier of a row in it: udot = D^-1 (y_0 + sum y_j x_j) - G a."""
-    y = _of_speeds("y", nu, "of the row")
-    whole = _more("y_0", nu, "tau - H^T e")
+    """tau - H^T e with the multiplier of a row: udot = D^-1 (y_0 + sum y_j x_j) - G a."""
+    y = _speed_quantity("y", nu, "of the row")
+    total = _accumulated("y_0", nu, "tau - H^T e")
     return Derivation(
-        f"generic{nu}", f"a multiplier felt by a hinge with {nu} speeds", (y, MULTIPLIER), (whole,),
-        (Equation("y_0 += y_j x_j", whole.symbol, _times(MULTIPLIER.symbol[0, 0], y.symbol)),),
+        f"generic{nu}", f"a multiplier felt by a hinge with {nu} speeds", (y, MULTIPLIER), (total,),
+        (Equation(
+            "y_0 += y_j x_j", total.symbol, _scale_vector(MULTIPLIER.symbol[0, 0], y.symbol)
+        ),),
         sources=SOURCES,
     )  # fmt: skip
 
 
-#: Steps that have no size of a hinge.
+#: Steps that do not depend on the number of hinge speeds.
 STEPS = (
     meet,
     gap,
@@ -468,5 +476,5 @@ STEPS = (
     yielded,
     loaded,
 )
-#: Steps for hinges that have speeds.
+#: Steps for hinges with at least one speed.
 OF_SPEEDS = (divide, couple, answered, pull)

@@ -1,8 +1,8 @@
-"""Mass distribution of a rigid body: integrals over its mass by the moments that survive.
+"""Mass distribution of a rigid body: integrals over its mass in terms of ten moments.
 
 A rigid body enters its equations of motion only through polynomials of second degree in the
-coordinates x, y, z of its points, so ten numbers stand for any distribution whatever: the mass,
-the mass centre, three moments and three products of inertia.
+coordinates x, y, z of its points, so ten numbers represent any distribution: the mass, the mass
+centre, three moments and three products of inertia.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..definition.notation import Matrix
 
 @dataclass(frozen=True)
 class MassDistribution:
-    """Moments of a mass distribution about the origin of x, y, z, in the axes x, y, z.
+    """Moments of a mass distribution about the origin of the axes x, y, z.
 
     `moments` are Ixx, Iyy, Izz = int (y^2 + z^2) dm and so on; `products` are Ixy, Ixz, Iyz =
     int x y dm and so on, positive as Jing and Stephansson, Fundamentals of Discrete Element
@@ -79,7 +79,7 @@ POINT = Matrix(sp.symbols("x y z", real=True))
 
 
 def general() -> MassDistribution:
-    """Ten free symbols M, x_c, y_c, z_c, I_xx ... I_yz: any body, any origin, any body axes."""
+    """Ten free symbols M, x_c, y_c, z_c, I_xx ... I_yz: any body, origin and body axes."""
     return MassDistribution(
         sp.Symbol("M", positive=True),
         Matrix(sp.symbols("x_c y_c z_c", real=True)),
@@ -89,7 +89,7 @@ def general() -> MassDistribution:
 
 
 def of_tensor(mass: sp.Expr, center: Matrix, inertia: Matrix) -> MassDistribution:
-    """Distribution with this mass, mass centre and (symmetric) inertia tensor about the origin."""
+    """Distribution with this mass, mass centre and symmetric inertia tensor about the origin."""
     return MassDistribution(
         mass,
         Matrix(center),

@@ -1,9 +1,8 @@
-"""Further right-hand sides through a factored tree: M^-1 times columns.
+"""Several right-hand sides with one factorisation of the tree: M^-1 times columns.
 
-S is carried to the root once, as for accelerations; of each elimination the factor of D and
-G = D^-1 H^T S stay.  What else the rows change by with the accelerations, as laws do within a step,
-goes into D.  A column of efforts tau then travels alone, with no bias motion and no load but its
-own:
+S is carried to the root once, as for accelerations; each elimination keeps the factor of D and G =
+D^-1 H^T S.  Other derivatives of the rows by accelerations, such as those of laws within a step,
+are added to D.  A column of efforts tau is then carried without bias motion or other loads:
 
     y = tau - H^T e,  e_Q = e + G^T y          tips to root
     udot = D^-1 y - G a_Q,  a = a_Q + H udot   root to tips
@@ -47,7 +46,7 @@ def _hinge(nu: int) -> tuple[Quantity, Quantity, Quantity, Quantity]:
 def factor(nu: int) -> Derivation:
     """F and G of a hinge, and S carried to the parent.
 
-    Of W, what the rows change by besides inertia, D takes the symmetric part.
+    Only the symmetric part of W (derivatives of the rows besides inertia) is added to D.
     """
     h, factored, gain, _ = _hinge(nu)
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
@@ -100,7 +99,7 @@ def _symmetric(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
 
 
 def push(nu: int) -> Derivation:
-    """The load of one column carried to the parent."""
+    """Load of one column carried to the parent."""
     h, _, gain, surplus = _hinge(nu)
     tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
     onward = symbol("e_Q", 6)
@@ -121,7 +120,7 @@ def push(nu: int) -> Derivation:
 
 
 def push_on_ground(nu: int) -> Derivation:
-    """y of one column at a hinge on the ground, which takes the load."""
+    """y of one column at a hinge on the ground."""
     h, _, _, surplus = _hinge(nu)
     tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
     value = tau.symbol - h.symbol.T * E.symbol
@@ -134,7 +133,7 @@ def push_on_ground(nu: int) -> Derivation:
 
 
 def answer(nu: int) -> Derivation:
-    """udot = D^-1 y - G X delta_I and the body's own deviation X delta_I + H udot."""
+    """udot = D^-1 y - G X delta_I and the deviation X delta_I + H udot of the body."""
     h, factor, gain, surplus = _hinge(nu)
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
     carried, below, alone = symbol("delta_Q", 6), symbol("z", nu), symbol("v", nu)

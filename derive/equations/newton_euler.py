@@ -1,14 +1,14 @@
 """Rigid-body equations of motion, derived by integrating Newton's law over the mass.
 
 Premises: every mass element obeys dm a = df; the internal forces have no resultant and no moment;
-the body is rigid, so that its points are fixed in body axes.  Two roads lead from there to Euler's
-equations at an arbitrary body-fixed origin o: the moments of the inertial forces,
-int r x a dm, and the rate of the angular momentum about the inertial origin.  `forms_difference`
-shows that they agree identically.
+the body is rigid, so that its points are fixed in body axes.  Two derivations lead to Euler's
+equations at an arbitrary body-fixed origin o: the moments of the inertial forces, int r x a dm, and
+the rate of the angular momentum about the inertial origin.  `forms_difference` shows that they
+agree identically.
 
-Vectors are 3 x 1 columns of components in body axes unless a name says otherwise; SI units.
-Source for comparison: Jing and Stephansson, Fundamentals of Discrete Element Methods for Rock
-Engineering, Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/book_formulas` compares.
+Vectors are 3 x 1 columns of components in body axes unless a name says otherwise; SI units.  Source
+for comparison: Jing and Stephansson, Fundamentals of Discrete Element Methods for Rock Engineering,
+Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/book_formulas` compares.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def component_rate(v: Matrix) -> Matrix:
 
 
 def rate(v: Matrix) -> Matrix:
-    """Components in body axes of the inertial time derivative of the vector with components `v`.
+    """Body-axes components of the inertial time derivative of the vector `v`.
 
     With R from body to inertial axes and dR/dt = R tilde(omega): R^T d(R v)/dt = dv/dt + omega x v.
     """
@@ -83,9 +83,10 @@ def angular_momentum_form(body: MassDistribution | None = None) -> Matrix:
 
 
 def relative_momentum_form(body: MassDistribution | None = None) -> Matrix:
-    """Moment about o as M r_c x a0 + dh/dt, h = int r x (omega x r) dm, cf. (2.35) (3 x 1, N m).
+    """Moment about o as M r_c x a0 + dh/dt (3 x 1, N m), cf. (2.35).
 
-    dh/dt is the inertial rate: the rate of the components of h in body axes plus omega x h.
+    h = int r x (omega x r) dm; dh/dt is the inertial rate: the rate of the components of h in
+    body axes plus omega x h.
     """
     body = body or general()
     momentum = relative_momentum(body)
@@ -107,7 +108,7 @@ def forms_difference(body: MassDistribution | None = None) -> tuple[Matrix, Matr
 
 
 def tensor_form(body: MassDistribution) -> Matrix:
-    """M r_c x a0 + J omegadot + omega x J omega: Euler's equations written with the tensor J."""
+    """Euler's equations with the tensor J: M r_c x a0 + J omegadot + omega x J omega."""
     inertia = body.inertia
     return Matrix(
         body.mass * tilde(body.center) * A0 + inertia * OMEGADOT + tilde(OMEGA) * inertia * OMEGA
@@ -115,16 +116,16 @@ def tensor_form(body: MassDistribution) -> Matrix:
 
 
 def principal_axes(body: MassDistribution) -> MassDistribution:
-    """The same body in axes that are principal at o: no products of inertia, (2.24)."""
+    """Same body in axes that are principal at o: no products of inertia, (2.24)."""
     zero = sp.Integer(0)
     return MassDistribution(body.mass, body.center, body.moments, (zero, zero, zero))
 
 
 def about_mass_center(body: MassDistribution) -> MassDistribution:
-    """A body whose origin is its mass centre, (2.25) case (b)."""
+    """Body whose origin is its mass centre, (2.25) case (b)."""
     return MassDistribution(body.mass, Matrix.zeros(3, 1), body.moments, body.products)
 
 
 def with_unaccelerated_origin(moment: Matrix) -> Matrix:
-    """The moment when o has no acceleration, as a body point fixed in space has none, (2.25)."""
+    """Moment if o has no acceleration, as for a body point fixed in space, (2.25)."""
     return Matrix(moment.subs(dict.fromkeys(A0, 0)))

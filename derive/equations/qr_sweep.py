@@ -1,22 +1,22 @@
-"""The sweep as least squares: S as U^T U, carried from tips to root by rotations of rows.
+"""Least-squares sweep: S = U^T U, carried from tips to root by rotations of rows.
 
-But for efforts, the accelerations are those that make the sum of the squares of rows smallest
-(Gauss, J. reine angew. Math. 4 (1829) 232-235).  A body's rows are a factor of its mass matrix, and
-all that hangs on a body has rows as well:
+Apart from efforts, the accelerations minimise the sum of the squares of rows (Gauss, J. reine
+angew. Math. 4 (1829) 232-235).  A body's rows are a factor of its mass matrix, and the bodies
+outboard of a body have rows as well:
 
     f = U^T (U a + d) + e,   S = U^T U
 
-with U upper triangular, d the load that rows can take (all of it where U is regular, as is that of
-a body with inertia of its own), and e the rest.  Across a hinge a = a_Q + H udot, and rotations
-make of the rows, with the rotors' own below them,
+with U upper triangular, d the load in the range of the rows (all of it where U is regular, as for a
+body with inertia of its own), and e the rest.  Across a hinge a = a_Q + H udot, and rotations
+transform the rows, with those of rotors below them, to
 
     [U H       U  d]       [R_u  R_a  d_u]
     [sqrt(J)   0  0]  ->   [0    V    d_V]
 
-so that D = R_u^T R_u, G = R_u^-1 R_a, and V, d_V are what travels on: S_Q = V^T V, without the
-difference S - U G of the Riccati sweep, in which the inertia of a heavy tip is taken off digit by
-digit until that of light links is left (Golub, Van Loan, Matrix Computations, 5.3, on rows against
-normal equations).
+so that D = R_u^T R_u, G = R_u^-1 R_a, and V, d_V are carried on: S_Q = V^T V, without the
+difference S - U G of the Riccati sweep, in which the inertia of light links remains after
+subtracting that of a heavy tip (Golub, Van Loan, Matrix Computations, 5.3, on rows against normal
+equations).
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ from .riccati_sweep import (
     transport,
 )
 
-#: A pivot of a mass matrix is at least this share of its diagonal entry: below is rounding.
+#: Least ratio of a pivot of a mass matrix to its diagonal entry; smaller values are rounding.
 _ROUNDING = sp.Rational(1, 10**15)
-#: A load is taken by rows whose diagonal entry exceeds this share of its column.
-_TAKEN = sp.Rational(1, 10**13)
-#: Least share of a column of U H, squared, that columns before it must leave of it.
+#: Rows with a diagonal entry above this share of their column carry load.
+_MIN_ROW_SHARE = sp.Rational(1, 10**13)
+#: Least remaining share, squared, of a column of U H after the columns before it.
 _INDEPENDENT = sp.Rational(1, 10**26)
 
 SOURCES_QR = (
@@ -63,56 +63,58 @@ PARENT_ROWS = Quantity(symbol("U_P", 21), "", "upper triangle of the parent so f
 PARENT_TAKEN = Quantity(symbol("d_P", 6), "", "load that its rows take")
 
 
-def triangular(numbers: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
-    """The upper triangular matrix whose 21 numbers these are, row by row."""
+def triangular(entries: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+    """Upper triangular matrix from its 21 entries, row by row."""
     return sp.ImmutableDenseMatrix(
-        6, 6, lambda i, j: numbers[6 * i - i * (i + 1) // 2 + j, 0] if j >= i else sp.Integer(0)
+        6, 6, lambda i, j: entries[6 * i - i * (i + 1) // 2 + j, 0] if j >= i else sp.Integer(0)
     )
 
 
-def _numbers(matrix: sp.Basic) -> sp.ImmutableDenseMatrix:
-    """The opposite: the upper triangle of a 6 x 6 matrix as a column."""
+def _triangle_entries(matrix: sp.Basic) -> sp.ImmutableDenseMatrix:
+    """Upper triangle of a 6 x 6 matrix as a column of 21 entries."""
     return sp.ImmutableDenseMatrix([matrix[i, j] for i in range(6) for j in range(i, 6)])
 
 
-def _scalar(name: str, value: sp.Expr, said: str) -> tuple[sp.Expr, Equation]:
-    found = symbol(name, 1, 1)
-    return found[0, 0], Equation(said, found, sp.ImmutableDenseMatrix([[value]]))
+def _scalar_equation(name: str, value: sp.Expr, meaning: str) -> tuple[sp.Expr, Equation]:
+    scalar = symbol(name, 1, 1)
+    return scalar[0, 0], Equation(meaning, scalar, sp.ImmutableDenseMatrix([[value]]))
 
 
 def factor() -> Derivation:
-    """U of a body alone: S = U^T U (Cholesky), for a mass matrix that may be singular."""
+    """U of a single body: S = U^T U (Cholesky), for a mass matrix that may be singular."""
     equations: list[Equation] = []
     entries: list[list[sp.Expr]] = []
     for i in range(6):
-        left = S.symbol[i, i] - sum(row[i] ** 2 for row in entries)
+        remainder = S.symbol[i, i] - sum(row[i] ** 2 for row in entries)
         least = _ROUNDING * S.symbol[i, i]
-        root, rooted = _scalar(f"root_{i + 1}", sp.sqrt(sp.Max(left, least)), f"U_{i + 1}{i + 1}")
-        share, shared = _scalar(
+        root, rooted = _scalar_equation(
+            f"root_{i + 1}", sp.sqrt(sp.Max(remainder, least)), f"U_{i + 1}{i + 1}"
+        )
+        share, shared = _scalar_equation(
             f"share_{i + 1}", sp.Piecewise((1 / root, root > 0), (0, True)), f"1 / U_{i + 1}{i + 1}"
         )
-        behind = [
+        later = [
             (S.symbol[i, j] - sum(row[i] * row[j] for row in entries)) * share
             for j in range(i + 1, 6)
         ]
         row = symbol(f"row_{i + 1}", 1, 6)
-        values = [*[sp.Integer(0)] * i, root, *behind]
+        values = [*[sp.Integer(0)] * i, root, *later]
         equations += [
             rooted, shared, Equation(f"row {i + 1}", row, sp.ImmutableDenseMatrix([values]))
         ]  # fmt: skip
         entries.append([row[0, j] for j in range(6)])
-    whole = sp.ImmutableDenseMatrix(entries)
-    equations.append(Equation("U", ROWS.symbol, _numbers(whole)))
+    matrix = sp.ImmutableDenseMatrix(entries)
+    equations.append(Equation("U", ROWS.symbol, _triangle_entries(matrix)))
     return Derivation(
         "qr", "rows of a body alone", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
     )
 
 
 def bias() -> Derivation:
-    """d and e of a rigid body alone, by its rows instead of by its load.
+    """d and e of a single rigid body, from its rows instead of its load.
 
-    Its load e_B = S [rdd + w x (w x r_C); wd] + [0; w x J_C w] is a difference of what a long arm
-    r_C makes large where the inertia J_C about the mass centre counts; its rows are sqrt(m) times
+    Its load e_B = S [rdd + w x (w x r_C); wd] + [0; w x J_C w] loses digits by cancellation for
+    a long arm r_C if the inertia J_C about the mass centre matters; its rows are sqrt(m) times
     the acceleration of the centre, and U_a times the angular one, J_C = U_a^T U_a.
     """
     u, motion = triangular(ROWS.symbol), MOTION.symbol
@@ -120,7 +122,7 @@ def bias() -> Derivation:
     arm = sp.ImmutableDenseMatrix([u[1, 5], -u[0, 5], u[0, 4]])
     inner = sp.ImmutableDenseMatrix(3, 3, lambda i, j: u[3 + i, 3 + j])
     accelerations, turning = symbol("a_B", 6), symbol("b", 6)
-    own, spun = symbol("U_a", 3, 3), symbol("h", 3)
+    inertia_rows, spun = symbol("U_a", 3, 3), symbol("h", 3)
     spin = tilde(w)
     return Derivation(
         "qr",
@@ -131,56 +133,58 @@ def bias() -> Derivation:
             Equation("bias acceleration", accelerations, stack(rdd, wd)),
             Equation("w x (w x r_C) sqrt(m)", turning, stack(spin * (spin * arm), sp.zeros(3, 1))),
             Equation("d", TAKEN.symbol, u * accelerations + turning),
-            Equation("rows of J_C", own, inner),
-            Equation("J_C w", spun, own.T * (own * w)),
+            Equation("rows of J_C", inertia_rows, inner),
+            Equation("J_C w", spun, inertia_rows.T * (inertia_rows * w)),
             Equation("w x J_C w", E.symbol, stack(sp.zeros(3, 1), spin * spun)),
         ),
         sources=SOURCES_QR,
     )
 
 
-def _load_taken() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbol]:
-    """d + U^-T e, row by row, and what is left of e where rows are too small to take it."""
+def _split_load() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbol]:
+    """d + U^-T e, row by row, and the remainder of e where rows are too small to carry it."""
     u, equations = triangular(ROWS.symbol), []
-    taken: list[sp.Expr] = []
-    rest: list[sp.Expr] = []
+    carried: list[sp.Expr] = []
+    uncarried: list[sp.Expr] = []
     for i in range(6):
-        left, equation = _scalar(
-            f"left_{i + 1}", E.symbol[i, 0] - sum(u[k, i] * taken[k] for k in range(i)),
+        remainder_i, equation = _scalar_equation(
+            f"left_{i + 1}", E.symbol[i, 0] - sum(u[k, i] * carried[k] for k in range(i)),
             f"load left for row {i + 1}",
         )  # fmt: skip
         size = sum(u[k, i] ** 2 for k in range(i + 1))
-        takes = u[i, i] ** 2 > _TAKEN**2 * size
-        added, adding = _scalar(
-            f"taken_{i + 1}", sp.Piecewise((left / u[i, i], takes), (0, True)), f"row {i + 1} takes"
+        takes = u[i, i] ** 2 > _MIN_ROW_SHARE**2 * size
+        added, adding = _scalar_equation(
+            f"taken_{i + 1}",
+            sp.Piecewise((remainder_i / u[i, i], takes), (0, True)),
+            f"row {i + 1} takes",
         )
-        kept, keeping = _scalar(
-            f"rest_{i + 1}", sp.Piecewise((0, takes), (left, True)), f"row {i + 1} leaves"
+        carried_i, carried_equation = _scalar_equation(
+            f"rest_{i + 1}", sp.Piecewise((0, takes), (remainder_i, True)), f"row {i + 1} leaves"
         )
-        equations += [equation, adding, keeping]
-        taken.append(added)
-        rest.append(kept)
+        equations += [equation, adding, carried_equation]
+        carried.append(added)
+        uncarried.append(carried_i)
     whole, remaining = symbol("d_all", 6), symbol("e_rest", 6)
-    total = [TAKEN.symbol[i, 0] + taken[i] for i in range(6)]
+    total = [TAKEN.symbol[i, 0] + carried[i] for i in range(6)]
     equations += [
         Equation("d + U^-T e", whole, sp.ImmutableDenseMatrix(total)),
-        Equation("what is left of e", remaining, sp.ImmutableDenseMatrix(rest)),
+        Equation("what is left of e", remaining, sp.ImmutableDenseMatrix(uncarried)),
     ]
     return tuple(equations), whole, remaining
 
 
 def qr_eliminate(nu: int) -> Derivation:
-    """G and g of a hinge, and the rows and loads behind it.
+    """G and g of a hinge, and the rows and loads passed on to its inboard side.
 
-    udot = g - G a_Q with g = R_u^-1 (R_u^-T (tau - H^T e) - d_u); of the load that no row takes
-    e_Q = e + G^T (tau - H^T e) goes on.
+    udot = g - G a_Q with g = R_u^-1 (R_u^-T (tau - H^T e) - d_u); the load outside the range of
+    the rows is e_Q = e + G^T (tau - H^T e).
     """
     h = Quantity(_subspace(nu), "", "motion subspace of the free coordinates")
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts on the free coordinates")
     gain, offset = gains(nu)
-    equations, load, rest = _load_taken()
-    rows, pivots = _rotated(nu), _pivots(nu)
+    equations, load, uncarried = _split_load()
+    rows, pivots = _rotated_rows(nu), _pivots(nu)
     u, pushed, surplus = triangular(ROWS.symbol), symbol("UH", 6, nu), symbol("surplus", nu)
     stacked: sp.Basic = sp.BlockMatrix([[u, load]])
     if nu:
@@ -190,20 +194,22 @@ def qr_eliminate(nu: int) -> Derivation:
         equations += (
             Equation("U H", pushed, u * h.symbol),
             Equation("diagonal of D", pivots, sp.ImmutableDenseMatrix(squares)),
-            Equation("tau - H^T e", surplus, tau.symbol - h.symbol.T * rest),
+            Equation("tau - H^T e", surplus, tau.symbol - h.symbol.T * uncarried),
         )
     equations += (Equation("rotated rows", rows, Triangle(stacked, nu + 6)),)
     if nu:
         equations += (
-            *_answers(nu, rows, surplus),
-            Equation("e_Q = e + G^T (tau - H^T e)", REST.symbol, rest + gain.symbol.T * surplus),
+            *_gain_equations(nu, rows, surplus),
+            Equation(
+                "e_Q = e + G^T (tau - H^T e)", REST.symbol, uncarried + gain.symbol.T * surplus
+            ),
         )
     else:
-        equations += (Equation("e_Q = e", REST.symbol, rest),)
-    behind = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[nu + i, nu + j])
+        equations += (Equation("e_Q = e", REST.symbol, uncarried),)
+    outboard_rows = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[nu + i, nu + j])
     onward = sp.ImmutableDenseMatrix([rows[nu + i, nu + 6] for i in range(6)])
     equations += (
-        Equation("V", ONWARD.symbol, _numbers(behind)),
+        Equation("V", ONWARD.symbol, _triangle_entries(outboard_rows)),
         Equation("d_V", ONWARD_TAKEN.symbol, onward),
     )
     return Derivation(
@@ -220,7 +226,7 @@ def _subspace(nu: int) -> sp.MatrixSymbol:
     return symbol("H", 6, nu)
 
 
-def _rotated(nu: int) -> sp.MatrixSymbol:
+def _rotated_rows(nu: int) -> sp.MatrixSymbol:
     return symbol("R", nu + 6, nu + 7)
 
 
@@ -228,11 +234,13 @@ def _pivots(nu: int) -> sp.MatrixSymbol:
     return symbol("D_ii", nu)
 
 
-def _answers(nu: int, rows: sp.MatrixSymbol, surplus: sp.MatrixSymbol) -> tuple[Equation, ...]:
-    """G and g by R_u = diag(R_ii) L^T, L with ones on its diagonal."""
+def _gain_equations(
+    nu: int, rows: sp.MatrixSymbol, surplus: sp.MatrixSymbol
+) -> tuple[Equation, ...]:
+    """G and g by R_u = diag(R_ii) L^T, L with a unit diagonal."""
     gain, offset = gains(nu)
     shares, lower = symbol("shares", nu), symbol("L", nu, nu)
-    below, left = symbol("y", nu), symbol("w", nu)
+    below, scaled_right = symbol("y", nu), symbol("w", nu)
     scaled = sp.ImmutableDenseMatrix(nu, 6, lambda k, j: shares[k, 0] * rows[k, nu + j])
     pulled = [shares[k, 0] * (shares[k, 0] * below[k, 0] - rows[k, nu + 6]) for k in range(nu)]
     return (
@@ -245,14 +253,16 @@ def _answers(nu: int, rows: sp.MatrixSymbol, surplus: sp.MatrixSymbol) -> tuple[
         ),
         Equation("G = R_u^-1 R_a", gain.symbol, Triangular(lower, scaled, transposed=True)),
         Equation("L^-1 (tau - H^T e)", below, Triangular(lower, surplus)),
-        Equation("R_ii^-1 (R_u^-T (tau - H^T e) - d_u)", left, sp.ImmutableDenseMatrix(pulled)),
-        Equation("g", offset.symbol, Triangular(lower, left, transposed=True)),
+        Equation(
+            "R_ii^-1 (R_u^-T (tau - H^T e) - d_u)", scaled_right, sp.ImmutableDenseMatrix(pulled)
+        ),
+        Equation("g", offset.symbol, Triangular(lower, scaled_right, transposed=True)),
     )  # fmt: skip
 
 
 def qr_guards(nu: int) -> tuple[tuple[sp.Basic, int, str], ...]:
-    """Those of the other sweep on the diagonal of D, and what earlier columns leave of a column."""
-    u, rows, pivots = triangular(ROWS.symbol), _rotated(nu), _pivots(nu)
+    """Guards of the diagonal of D, and of the remainder of a column after earlier ones."""
+    u, rows, pivots = triangular(ROWS.symbol), _rotated_rows(nu), _pivots(nu)
     diagonal = sp.diag(*[sum(u[k, i] ** 2 for k in range(i + 1)) for i in range(6)])
     independent = tuple(
         (
@@ -266,18 +276,18 @@ def qr_guards(nu: int) -> tuple[tuple[sp.Basic, int, str], ...]:
 
 
 def merge() -> Derivation:
-    """Rows behind a hinge added to those of the parent, the load that they do not take to its e.
+    """Add the rows of a hinge to those of the parent, and the remaining load to its e.
 
-    A row V of the hinge is V X of the parent, X = [R^T  -R^T r~; 0  R^T]; rotations put both into
-    one triangle.
+    A row V of the hinge is V X of the parent, X = [R^T  -R^T r~; 0  R^T]; rotations combine
+    both into one triangle.
     """
-    v, own = triangular(ONWARD.symbol), triangular(PARENT_ROWS.symbol)
-    turned, moved = symbol("V_a", 6, 3), symbol("V_r", 6, 3)
+    v, parent_rows = triangular(ONWARD.symbol), triangular(PARENT_ROWS.symbol)
+    turned, linear_part = symbol("V_a", 6, 3), symbol("V_r", 6, 3)
     back = R.symbol.T
     linear = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, j])
     angular = sp.ImmutableDenseMatrix(6, 3, lambda i, j: v[i, 3 + j])
     rows = symbol("R", 6, 7)
-    found = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[i, j])
+    triangle = sp.ImmutableDenseMatrix(6, 6, lambda i, j: rows[i, j])
     return Derivation(
         "qr",
         "rows added to those of the parent",
@@ -287,7 +297,7 @@ def merge() -> Derivation:
             Equation("V by accelerations at the parent", turned, linear * back),
             Equation(
                 "V by its angular accelerations",
-                moved,
+                linear_part,
                 angular * back - turned * tilde(column(SHIFT.symbol)),
             ),
             Equation(
@@ -295,13 +305,13 @@ def merge() -> Derivation:
                 rows,
                 Triangle(
                     sp.BlockMatrix(
-                        [[own, PARENT_TAKEN.symbol],
-                         [sp.BlockMatrix([[turned, moved]]), ONWARD_TAKEN.symbol]]
+                        [[parent_rows, PARENT_TAKEN.symbol],
+                         [sp.BlockMatrix([[turned, linear_part]]), ONWARD_TAKEN.symbol]]
                     ),
                     6,
                 ),
             ),
-            Equation("U", ROWS.symbol, _numbers(found)),
+            Equation("U", ROWS.symbol, _triangle_entries(triangle)),
             Equation("d", TAKEN.symbol, sp.ImmutableDenseMatrix([rows[i, 6] for i in range(6)])),
             Equation("X^T e_Q", PARENT_E.symbol, transport(REST.symbol)),
         ),
@@ -310,7 +320,7 @@ def merge() -> Derivation:
 
 
 def restored() -> Derivation:
-    """S and e of the rows and loads, as whoever asks for the load at P reads them."""
+    """S and e of the rows and loads, for readers of the load at P."""
     u = triangular(ROWS.symbol)
     e = Quantity(symbol("e_S", 6), "N, N*m", "force part of f = S a + e")
     return Derivation(

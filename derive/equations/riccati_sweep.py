@@ -1,9 +1,9 @@
-"""The Riccati sweep as matrix equations: absorb a body, pass a hinge, condense, recover.
+"""Riccati sweep as matrix equations: add a body, pass a hinge, condense, recover.
 
-Between any two elements force and acceleration stand in the relation f = S a + e (Riccati form of
-the transfer relation, a = [linear; angular], f = [force; moment]).  Swept from the tips to the
-root S and e are known; swept back, every acceleration follows.  In the accelerations used here S
-is the articulated-body inertia.
+Between any two elements force and acceleration satisfy f = S a + e (Riccati form of the transfer
+relation, a = [linear; angular], f = [force; moment]).  The backward pass from the tips to the root
+gives S and e; the forward pass gives every acceleration.  In the accelerations used here S is the
+articulated-body inertia.
 
 The equations are stated in deviations from a *bias motion*, the motion with prescribed hinge
 accelerations s (zero for free coordinates): delta a = a - a_bias.  Then velocity terms appear once,
@@ -21,7 +21,7 @@ from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde
 from .block_matrices import column, diagonal, part, stack, symbol
 from .hinge import HingeMotion
 
-#: A pivot must exceed this share of the mean inertia of the body that it moves.
+#: Least ratio of a pivot to the mean inertia of the body that it moves.
 PIVOT_FLOOR = sp.Rational(1, 10**14)
 
 SOURCES = (
@@ -31,7 +31,7 @@ SOURCES = (
 
 
 def free_speeds(nu: int) -> str:
-    """How many coordinates are free, for a title."""
+    """Text such as "2 free speeds" for titles."""
     return f"{nu or 'no'} free speed{'' if nu == 1 else 's'}"
 
 
@@ -79,32 +79,32 @@ def _bias_equations(
     """Bias motion of the outboard body from that of its parent."""
     w_i, wd_i, a_i = (part(PARENT_MOTION.symbol, k) for k in (0, 3, 6))
     carrier = symbol("K", 3, 3)
-    seen = symbol("w_Q", 3)
+    spin_q = symbol("w_Q", 3)
     local = symbol("c_s", 6)
     lever = RO.symbol if _is_zero(position) else RO.symbol + RT.symbol * position
-    own = imposed if imposed is not None and _is_zero(c) else c
-    if own is c and imposed is not None:
-        own = c + imposed
+    acceleration = imposed if imposed is not None and _is_zero(c) else c
+    if acceleration is c and imposed is not None:
+        acceleration = c + imposed
     equations = [
         Equation("rotation to the parent", R.symbol, RT.symbol * rotation),
         Equation("lever in the parent", SHIFT.symbol, lever),
         Equation("carrier's K = wd~ + w~ w~", carrier, tilde(wd_i) + tilde(w_i) * tilde(w_i)),
-        Equation("carrier's angular velocity in body axes", seen, R.symbol.T * w_i),
-        Equation("hinge's own acceleration", local, own),
+        Equation("carrier's angular velocity in body axes", spin_q, R.symbol.T * w_i),
+        Equation("hinge's own acceleration", local, acceleration),
     ]
     angular = R.symbol.T * wd_i + part(local, 3)
     if not _is_zero(w):
-        angular = angular + tilde(part(seen, 0)) * w
+        angular = angular + tilde(part(spin_q, 0)) * w
     linear = R.symbol.T * (a_i + carrier * SHIFT.symbol) + part(local, 0)
     if not _is_zero(v):
-        linear = linear + 2 * tilde(part(seen, 0)) * v
-    motion = stack(seen + w, angular, linear)
+        linear = linear + 2 * tilde(part(spin_q, 0)) * v
+    motion = stack(spin_q + w, angular, linear)
     equations.append(Equation("bias motion", MOTION.symbol, motion))
     return tuple(equations)
 
 
 def _is_zero(value: sp.Basic) -> bool:
-    """Whether an explicit matrix is zero throughout."""
+    """Whether all entries of an explicit matrix are zero."""
     return isinstance(value, sp.MatrixBase) and value.is_zero_matrix is True
 
 
@@ -149,7 +149,7 @@ def forward_generic(nu: int) -> Derivation:
 
 
 def transport(force: sp.MatrixSymbol) -> sp.BlockMatrix:
-    """X^T f: the load at P, felt at P of the parent, parent axes."""
+    """X^T f: load at P carried to P of the parent, parent axes."""
     push = R.symbol * part(force, 0)
     return stack(push, R.symbol * part(force, 3) + tilde(column(SHIFT.symbol)) * push)
 
@@ -193,12 +193,12 @@ def outboard_deviation() -> sp.BlockMatrix:
 
 def unit_directions(subspace: sp.MatrixBase) -> dict[int, int]:
     """{row: column} for every column of H that is a unit vector."""
-    found = {}
+    columns = {}
     for j in range(subspace.cols):
         direction = list(subspace[:, j])
         if direction.count(0) == 5 and direction.count(1) == 1:
-            found[direction.index(1)] = j
-    return found
+            columns[direction.index(1)] = j
+    return columns
 
 
 def condense(
@@ -207,7 +207,7 @@ def condense(
     inputs: tuple[Quantity, ...] = (),
     name: str | None = None,
 ) -> Derivation:
-    """S and e carried across a hinge to the parent; gains G, g for the way back.
+    """S and e carried across a hinge to the parent, and the gains G, g of the forward pass.
 
     D = H^T S H + J,  G = D^-1 H^T S,  g = D^-1 (tau - H^T e)
     S_Q = S - S H G,  e_Q = e + S H g   (then transported by X)
@@ -257,11 +257,11 @@ def condense(
         Equation("X^T S_Q X", PARENT_S.symbol, transported),
         Equation("X^T e_Q", PARENT_E.symbol, transport(load)),
     ]
-    given = inputs if specialised else (h_given, rotor)
+    extra_inputs = inputs if specialised else (h_given, rotor)
     return Derivation(
         name or f"generic{nu}",
         f"S and e carried across a hinge with {free_speeds(nu)}",
-        (R, SHIFT, *given, FLOOR, S, E, tau),
+        (R, SHIFT, *extra_inputs, FLOOR, S, E, tau),
         (gain, offset, PARENT_S, PARENT_E),
         tuple(equations),
         sources=SOURCES,
@@ -271,7 +271,7 @@ def condense(
 def replace_rows(
     full: sp.MatrixSymbol, tau: sp.MatrixSymbol, units: dict[int, int]
 ) -> sp.ImmutableDenseMatrix:
-    """A load whose rows along unit directions are the efforts there."""
+    """Load with the efforts tau in the rows along unit directions."""
     return sp.ImmutableDenseMatrix(
         [tau[units[i], 0] if i in units else full[i, 0] for i in range(6)]
     )
@@ -284,29 +284,29 @@ def pivot_guards(
     pivots: sp.MatrixBase | None = None,
     whole: sp.Basic = S.symbol,
 ) -> tuple[tuple[sp.Basic, int, str], ...]:
-    """Each diagonal entry of D against what the body's own inertia lets pass for rounding.
+    """Guards of the diagonal of D relative to the body's own inertia.
 
-    Not against the inertia of all that hangs on it: across the plane of a long planar chain that
-    grows with the cube of its length, while the pivots in the plane stay what they are.  A body
-    without inertia of its own has nothing else to be judged by (`whole`, whose diagonal counts).
-    `pivots` is the diagonal of D where D itself is no quantity.
+    The composite inertia is no suitable scale: across the plane of a long planar chain it grows
+    with the cube of its length, while the in-plane pivots stay constant.  It is used only for a
+    body without own inertia (`whole`, by its diagonal).  `pivots` is the diagonal of D where D
+    itself is no quantity.
     """
     pivots = diagonal(symbol("D", nu, nu)) if pivots is None else pivots
     h = symbol("H", 6, nu) if subspace is None else sp.ImmutableDenseMatrix(subspace)
     guards = []
     for i in range(nu):
-        along = sum(h[k, i] ** 2 for k in range(3))
+        translation = sum(h[k, i] ** 2 for k in range(3))
         about = sum(h[k, i] ** 2 for k in range(3, 6))
-        least = along * _own_or_all(floor[0, 0], whole, 0)
-        least += about * _own_or_all(floor[1, 0], whole, 3)
+        least = translation * _own_or_composite(floor[0, 0], whole, 0)
+        least += about * _own_or_composite(floor[1, 0], whole, 3)
         text = f"speed {i + 1} of {nu} moves no inertia: its acceleration is undetermined"
         guards.append((pivots[i, 0] > least, 1, text))
     return tuple(guards)
 
 
-def _own_or_all(own: sp.Expr, whole: sp.Basic, first: int) -> sp.Expr:
-    """The body's own floor, or that of all that hangs on it where the body has no inertia."""
-    return sp.Piecewise((own, own > 0), (floor_of(whole)[first // 3], True))
+def _own_or_composite(body_floor: sp.Expr, composite: sp.Basic, first: int) -> sp.Expr:
+    """Limit from the body's own inertia, or from the composite inertia if that is zero."""
+    return sp.Piecewise((body_floor, body_floor > 0), (floor_of(composite)[first // 3], True))
 
 
 def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
@@ -322,7 +322,7 @@ def recover(
     inputs: tuple[Quantity, ...] = (),
     name: str | None = None,
 ) -> Derivation:
-    """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
+    """udot = g - G X delta_I and the deviation X delta_I + H udot of the body."""
     gain, offset = gains(nu)
     h_given = Quantity(symbol("H", 6, nu), "", "motion subspace of the free coordinates")
     h = sp.ImmutableDenseMatrix(subspace) if subspace is not None else h_given.symbol
@@ -336,11 +336,11 @@ def recover(
         ]
     else:
         equations.append(Equation("deviation of the body", DELTA.symbol, carried))
-    given = inputs if subspace is not None else (h_given,)
+    extra_inputs = inputs if subspace is not None else (h_given,)
     return Derivation(
         name or f"generic{nu}",
         f"accelerations recovered across a hinge with {free_speeds(nu)}",
-        (R, SHIFT, *given, gain, offset, PARENT_DELTA),
+        (R, SHIFT, *extra_inputs, gain, offset, PARENT_DELTA),
         (rates, DELTA),
         tuple(equations),
         sources=SOURCES,
@@ -348,7 +348,7 @@ def recover(
 
 
 def effort(nu: int) -> Derivation:
-    """tau = H^T f: what a hinge's coordinates feel of the load f at P."""
+    """tau = H^T f: efforts of the load f at P on a hinge's coordinates."""
     h = Quantity(symbol("H", 6, nu), "", "motion subspace")
     force = Quantity(symbol("f", 6), "N, N*m", "load of the inboard on the outboard side at P")
     tau = Quantity(symbol("tau", nu), "N, N*m", "efforts along the speeds")
@@ -362,21 +362,21 @@ def effort(nu: int) -> Derivation:
 
 
 def exerted(nu: int) -> Derivation:
-    """e = S H udot: the load at P that the accelerations of a hinge ask for."""
+    """e = S H udot: load at P that the accelerations of a hinge require."""
     h = Quantity(symbol("H", 6, nu), "", "motion subspace")
     rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
-    whole = Quantity(S.symbol, "", "inertia of everything outboard, at P", symmetric=True)
+    inertia = Quantity(S.symbol, "", "inertia of everything outboard, at P", symmetric=True)
     return Derivation(
         f"generic{nu}",
         f"load of what a hinge with {nu} speeds accelerates",
-        (whole, h, rates),
+        (inertia, h, rates),
         (E,),
         (Equation("e = S H udot", E.symbol, S.symbol * (h.symbol * rates.symbol)),),
     )
 
 
 def project(nu: int) -> Derivation:
-    """udot = (H^T H)^-1 H^T (delta - X delta_I): accelerations of a hinge between known motions."""
+    """udot = (H^T H)^-1 H^T (delta - X delta_I): hinge accelerations from known motions."""
     h = Quantity(symbol("H", 6, nu), "", "motion subspace")
     rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")
     carried, gap, gram = symbol("delta_Q", 6), symbol("gap", 6), symbol("HH", nu, nu)

@@ -1,8 +1,8 @@
-"""The rigid body as the sweep uses it: accelerations out, forces in, from the integrated premises.
+"""Rigid body as used by the sweep: accelerations out, forces in.
 
-One input end I, any number of output ends O_1, O_2, ..., external forces and moments at any
-points; full inertia about I.  Nothing is transcribed: the coefficients of the accelerations are
-read off the integrals of `newton_euler`.
+One input end I, any number of output ends O_1, O_2, ..., external forces and moments at any points;
+full inertia about I.  The coefficients of the accelerations are extracted from the integrals of
+`newton_euler`, not transcribed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CENTER = vector("r_IC", 3)
 INERTIA = sp.MatrixSymbol("J_I", 3, 3)
 OMEGA = vector("omega", 3)
 
-#: What every rigid body needs, in any axes common to all (body or inertial).
+#: Quantities of every rigid body, in any common axes (body or inertial).
 BODY_INPUTS = (
     Quantity(MASS, "kg", "mass"),
     Quantity(CENTER, "m", "mass centre from the input end I"),
@@ -33,9 +33,9 @@ BODY_INPUTS = (
 
 
 def inertial_wrench(acceleration: sp.MatrixSymbol) -> Matrix:
-    """[int a dm; int r x a dm] about I for a = [acceleration of I; angular acceleration] (6 x 1).
+    """[int a dm; int r x a dm] about I, with a = [acceleration of I; angular acceleration].
 
-    The integrals of `newton_euler` with this body's data in place of their symbols.
+    6 x 1: the integrals of `newton_euler` with this body's data in place of their symbols.
     """
     a = explicit(acceleration)
     inertia = explicit(INERTIA)
@@ -83,7 +83,7 @@ def rigid_body(outputs: int = 1, loads: int = 0) -> Derivation:
 
 
 def newton_euler_form() -> Derivation:
-    """The body alone, free at its output ends: what the element `rigid` states in its parameters.
+    """Single body, free at its output ends, in the parameters of the element `rigid`.
 
     These are mass = M, the column mc = M r_IC and the tensor J = J_I.
     """
@@ -111,7 +111,7 @@ def _load(k: int) -> Triple:
 
 
 def _shift(r: Matrix) -> Matrix:
-    """Accelerations at I to accelerations at the end r away (6 x 6)."""
+    """Matrix (6 x 6) from accelerations at I to accelerations at the end at r."""
     return Matrix(sp.Matrix(sp.BlockMatrix([[sp.eye(3), -tilde(r)], [sp.zeros(3), sp.eye(3)]])))
 
 

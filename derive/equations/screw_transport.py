@@ -1,14 +1,15 @@
-"""Transport across an axial screw: a turn about a coordinate axis and a shift along the same axis.
+"""Transport across an axial screw: rotation about a coordinate axis and shift along it.
 
-Every connection of two hinge axes is a screw about z, then one about x (Denavit and Hartenberg,
-J. Appl. Mech. 22 (1955) 215-221; frames as in Khalil and Kleinfinger, Proc. IEEE Int. Conf.
-Robotics and Automation (1986) 1174-1179), and a pin's own motion is a screw about z.  In parts the
-transport of S costs less than half of X^T S X with a full rotation.  R turns outboard axes to
-inboard ones; the outboard origin lies d along the axis:
+Every connection of two hinge axes is a screw about z, then one about x (Denavit and Hartenberg, J.
+Appl. Mech. 22 (1955) 215-221; frames as in Khalil and Kleinfinger, Proc. IEEE Int. Conf. Robotics
+and Automation (1986) 1174-1179), and a pin's own motion is a screw about z.  In two stages the
+transport of S costs less than half of X^T S X with a full rotation.  R maps outboard axes to
+inboard ones; the outboard origin is at d along the axis:
 
     S_I = X^T S X,   e_I = X^T e,   delta = X delta_I,   X = [R^T  -R^T r~; 0  R^T],   r = d e_k
 
-S is carried as R A R^T as it stands, so that its products fold where c and s are constants.
+S is carried as R A R^T without simplification, so that its products fold where c and s are
+constants.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ Pair = tuple[sp.MatrixSymbol, sp.MatrixSymbol]
 
 
 def _plane(k: int) -> tuple[int, int]:
-    """The axes that a turn about axis k mixes, in right-handed order."""
+    """Axes mixed by a rotation about axis k, in right-handed order."""
     return (k + 1) % 3, (k + 2) % 3
 
 
@@ -51,7 +52,7 @@ def _block(symbol: sp.MatrixSymbol, row: int, column: int) -> sp.ImmutableDenseM
 
 @dataclass(frozen=True)
 class Stage:
-    """A screw about axis k in a longer derivation; `mark` tells its intermediate names apart."""
+    """A screw about axis k in a longer derivation; `mark` makes intermediate names unique."""
 
     k: int
     cosine: sp.Expr
@@ -61,7 +62,7 @@ class Stage:
 
     @property
     def rotation(self) -> sp.ImmutableDenseMatrix:
-        """Outboard axes to inboard axes."""
+        """Rotation, outboard axes to inboard axes."""
         i, j = _plane(self.k)
         c, s = self.cosine, self.sine
         return _matrix({(self.k, self.k): sp.Integer(1),
@@ -69,60 +70,67 @@ class Stage:
 
     @property
     def position(self) -> sp.ImmutableDenseMatrix:
-        """Outboard origin from the inboard one."""
+        """Position of the outboard origin from the inboard one."""
         return sp.ImmutableDenseMatrix(
             [self.shift if i == self.k else sp.Integer(0) for i in range(3)]
         )
 
     def symbol(self, name: str, rows: int, columns: int = 1) -> sp.MatrixSymbol:
-        """An intermediate quantity of this stage."""
+        """Intermediate quantity of this stage."""
         return symbol(name + self.mark, rows, columns)
 
     def carried(self, s: sp.MatrixSymbol, e: sp.MatrixSymbol, out: Pair) -> tuple[Equation, ...]:
         """Equations that carry s and e to the inboard origin; `out` are the results' symbols."""
         rotation = Equation("rotation", self.symbol("R", 3, 3), self.rotation)
-        return (rotation, *self._turned(s), *self._load_turned(e), *self._shifted(*out))
+        return (
+            rotation,
+            *self._rotated_blocks(s),
+            *self._rotated_load(e),
+            *self._shift_equations(*out),
+        )
 
-    def _load_turned(self, e: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    def _rotated_load(self, e: sp.MatrixSymbol) -> tuple[Equation, ...]:
         turn = self.symbol("R", 3, 3)
         return (
             Equation("force, inboard axes", self.symbol("push", 3), turn * part(e, 0)),
             Equation("moment, inboard axes", self.symbol("moment", 3), turn * part(e, 3)),
         )
 
-    def _turned(self, s: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    def _rotated_blocks(self, s: sp.MatrixSymbol) -> tuple[Equation, ...]:
         """R A R^T, R B R^T, R C R^T."""
         turn = self.symbol("R", 3, 3)
         return tuple(
             Equation(
-                f"{words}, inboard axes", self.symbol(name, 3, 3),
+                f"{label}, inboard axes", self.symbol(name, 3, 3),
                 turn * _block(s, row, column) * turn.T, symmetric=row == column,
             )
-            for name, words, row, column in _BLOCKS
+            for name, label, row, column in _BLOCKS
         )  # fmt: skip
 
-    def _shifted(self, out_s: sp.MatrixSymbol, out_e: sp.MatrixSymbol) -> tuple[Equation, ...]:
+    def _shift_equations(
+        self, out_s: sp.MatrixSymbol, out_e: sp.MatrixSymbol
+    ) -> tuple[Equation, ...]:
         """B_I = B - A r~,  C_I = C + r~ B_I - B^T r~,  moment + r x force."""
-        a, b, c, moved, shifted = (self.symbol(n, 3, 3) for n in ("A", "B", "C", "B_I", "C_I"))
+        a, b, c, mixed, shifted = (self.symbol(n, 3, 3) for n in ("A", "B", "C", "B_I", "C_I"))
         push, moment = self.symbol("push", 3), self.symbol("moment", 3)
         lever = tilde(self.position)
         return (
             Equation(
-                "mixed block at the inboard origin", moved, b - a * lever,
-                computed=self._moved_mixed(a, b),
+                "mixed block at the inboard origin", mixed, b - a * lever,
+                computed=self._shifted_mixed(a, b),
             ),
             Equation(
                 "moment-rotation block at the inboard origin", shifted,
-                c + lever * moved - b.T * lever,
-                symmetric=True, computed=self._moved_corner(b, c, moved),
+                c + lever * mixed - b.T * lever,
+                symmetric=True, computed=self._shifted_corner(b, c, mixed),
             ),
             Equation(
-                "S at the inboard origin", out_s, sp.BlockMatrix([[a, moved], [moved.T, shifted]])
+                "S at the inboard origin", out_s, sp.BlockMatrix([[a, mixed], [mixed.T, shifted]])
             ),
             Equation("e at the inboard origin", out_e, stack(push, moment + lever * push)),
         )  # fmt: skip
 
-    def _moved_mixed(self, a: sp.MatrixSymbol, b: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+    def _shifted_mixed(self, a: sp.MatrixSymbol, b: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
         i, j = _plane(self.k)
         mixed = _entries(b)
         for m in range(3):
@@ -130,40 +138,40 @@ class Stage:
             mixed[m, j] = b[m, j] + self.shift * a[m, i]
         return _matrix(mixed)
 
-    def _moved_corner(
-        self, b: sp.MatrixSymbol, c: sp.MatrixSymbol, moved: sp.MatrixSymbol
+    def _shifted_corner(
+        self, b: sp.MatrixSymbol, c: sp.MatrixSymbol, mixed: sp.MatrixSymbol
     ) -> sp.ImmutableDenseMatrix:
         k, (i, j), d = self.k, _plane(self.k), self.shift
         corner = _entries(c)
         corner[k, i] = corner[i, k] = c[k, i] - d * b[j, k]
         corner[k, j] = corner[j, k] = c[k, j] + d * b[i, k]
-        corner[i, i] = c[i, i] - d * (moved[j, i] + b[j, i])
-        corner[j, j] = c[j, j] + d * (moved[i, j] + b[i, j])
-        corner[i, j] = corner[j, i] = c[i, j] + d * (b[i, i] - moved[j, j])
+        corner[i, i] = c[i, i] - d * (mixed[j, i] + b[j, i])
+        corner[j, j] = c[j, j] + d * (mixed[i, j] + b[i, j])
+        corner[i, j] = corner[j, i] = c[i, j] + d * (b[i, i] - mixed[j, j])
         return _matrix(corner)
 
     # --- motion and accelerations ---------------------------------------------------------------
 
     def behind(self, motion: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
-        """Bias motion of the outboard frame, at rest in the inboard one."""
+        """Bias motion of the outboard frame, which is at rest in the inboard one."""
         w, wd, rdd = (part(motion, n) for n in (0, 3, 6))
         turn, carrier = self.symbol("R", 3, 3), self.symbol("K", 3, 3)
         back = turn.T
-        moved = rdd + carrier * self.position
+        acceleration = rdd + carrier * self.position
         return (
             Equation("rotation", turn, self.rotation),
             Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
-            Equation("bias motion", out, stack(back * w, back * wd, back * moved)),
+            Equation("bias motion", out, stack(back * w, back * wd, back * acceleration)),
         )
 
     def deviation(self, delta: sp.MatrixSymbol, out: sp.MatrixSymbol) -> tuple[Equation, ...]:
-        """X delta."""
+        """X delta: deviation in the outboard frame."""
         a, alpha = part(delta, 0), part(delta, 3)
         turn = self.symbol("R", 3, 3)
-        moved = a - tilde(self.position) * alpha
+        acceleration = a - tilde(self.position) * alpha
         return (
             Equation("rotation", turn, self.rotation),
-            Equation("X delta", out, stack(turn.T * moved, turn.T * alpha)),
+            Equation("X delta", out, stack(turn.T * acceleration, turn.T * alpha)),
         )
 
 
@@ -179,12 +187,12 @@ def _entries(symbol: sp.MatrixSymbol) -> Scalars:
 
 
 def screw_from_inputs(axis: str) -> Stage:
-    """The screw about `axis` whose turn and shift are inputs."""
+    """Screw about `axis` whose rotation and shift are inputs."""
     return Stage(AXES[axis], TURN.symbol[0, 0], TURN.symbol[1, 0], SHIFT_ALONG.symbol[0, 0])
 
 
 def condense(axis: str) -> Derivation:
-    """S and e across a screw about `axis`."""
+    """S and e carried across a screw about `axis`."""
     return Derivation(
         "screw",
         f"S and e across a screw about {axis}",
@@ -198,11 +206,13 @@ def condense(axis: str) -> Derivation:
 def turn() -> Derivation:
     """S and e in other axes through the same point."""
     rotation = R_GIVEN.symbol
-    turned = []
-    for name, words, row, column in _BLOCKS:
+    equations = []
+    for name, label, row, column in _BLOCKS:
         value = rotation * _block(S.symbol, row, column) * rotation.T
         same = row == column
-        turned.append(Equation(f"{words}, inboard axes", symbol(name, 3, 3), value, symmetric=same))
+        equations.append(
+            Equation(f"{label}, inboard axes", symbol(name, 3, 3), value, symmetric=same)
+        )
     a, b, c = (symbol(n, 3, 3) for n in ("A", "B", "C"))
     load = stack(rotation * part(E.symbol, 0), rotation * part(E.symbol, 3))
     return Derivation(
@@ -211,7 +221,7 @@ def turn() -> Derivation:
         (R_GIVEN, S, E),
         (OUT_S, OUT_E),
         (
-            *turned,
+            *equations,
             Equation("S, inboard axes", OUT_S.symbol, sp.BlockMatrix([[a, b], [b.T, c]])),
             Equation("e, inboard axes", OUT_E.symbol, load),
         ),
@@ -220,10 +230,11 @@ def turn() -> Derivation:
 
 
 def turn_by_trace() -> Derivation:
-    """The same for a rotation known only at run time: A's first diagonal entry by A's trace.
+    """S and e in other axes, with the first diagonal entry of A from its trace.
 
-    That saves a row of each product, and relies on R R^T = 1 where `turn` does not.  The first,
-    because of links along x the transverse entries are wanted first (and at the root, alone).
+    That saves a row of each product, and relies on R R^T = 1 where `turn` does not.  The first
+    entry is chosen because with links along x the transverse entries are needed first (and at
+    the root, only).
     """
     plain, rotation = turn(), R_GIVEN.symbol
     rows, m = symbol("A_rows", 2, 3), _block(S.symbol, 0, 0)
@@ -231,19 +242,19 @@ def turn_by_trace() -> Derivation:
     entries |= {(i, j): rows[i - 1, j] for i in (1, 2) for j in range(i, 3)}
     entries[0, 0] = (m[0, 0] + m[1, 1] + m[2, 2]) - rows[0, 1] - rows[1, 2]
     lower = sp.ImmutableDenseMatrix(2, 3, lambda i, j: rotation[i + 1, j])
-    first, *others = plain.definitions
+    first, *remaining = plain.definitions
     return replace(
         plain,
         title="S and e in turned axes, by the trace",
         definitions=(
             Equation("two rows of A, inboard axes", rows, lower * m * rotation.T),
             replace(first, computed=_matrix(entries)),
-            *others,
+            *remaining,
         ),
     )
 
 
 def derivations() -> dict[str, Derivation]:
-    """Every step by its kernel's name."""
+    """All steps by the names of their kernels."""
     across = {f"condense_{axis}": condense(axis) for axis in AXES}
     return {"condense_turn_by_trace": turn_by_trace(), **across}

@@ -1,8 +1,8 @@
-"""The tangent across a hinge: its directions, and its unknowns eliminated.
+"""Tangent across a hinge: its directions, and elimination of its unknowns.
 
-Equations and names are those of `tangent`.  Along a direction the hinge's own kernel, once it is
-differentiated, says how what is across it changes; a constant subspace says it all by itself.
-There is a kernel for every number of free speeds.
+Equations and names are those of `tangent_sweep`.  Changes across the hinge along a direction come
+from the hinge's own differentiated kernel; a constant subspace determines them directly.  There is
+a kernel for every number of free speeds.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def tangent_turned() -> Derivation:
 
 
 def tangent_along(nu: int) -> Derivation:
-    """theta = H_w dq and R^T dd = H_v dq where the rates of the coordinates are the speeds."""
+    """theta = H_w dq and R^T dd = H_v dq, for coordinate rates equal to the speeds."""
     h, d_q = symbol("H", 6, nu), symbol("d_q", nu)
     return Derivation(
         f"generic{nu}",
@@ -71,14 +71,14 @@ def tangent_along(nu: int) -> Derivation:
 
 
 def tangent_carrier(nu: int) -> Derivation:
-    """w_Q = w - w_rel and so on: what the body's own motion gives back of that of Q."""
+    """Motion of Q from that of the body: w_Q = w - w_rel and so on."""
     h, s, v, w, c, motion = (symbol(name, *shape) for name, shape in (
         ("H", (6, nu)), ("s", (nu,)), ("v", (3,)), ("w", (3,)), ("c", (6,)), ("motion", (9,))
     ))  # fmt: skip
-    turning, rate, seen, bias = (symbol(name, rows) for name, rows in (
+    turning, rate, acceleration, bias = (symbol(name, rows) for name, rows in (
         ("w_Q", 3), ("wd_Q", 3), ("a_Q", 3), ("c_s", 6)
     ))  # fmt: skip
-    own = tilde(column(turning))
+    spin = tilde(column(turning))
     return Derivation(
         f"generic{nu}",
         f"motion of Q across a hinge with {nu} speeds",
@@ -88,14 +88,16 @@ def tangent_carrier(nu: int) -> Derivation:
             Equation("angular velocity of Q", turning, part(motion, 0) - column(w)),
             Equation("own acceleration", bias, c + h * s if nu else c),
             Equation(
-                "angular acceleration of Q", rate, part(motion, 3) - own * column(w) - part(bias, 3)
+                "angular acceleration of Q",
+                rate,
+                part(motion, 3) - spin * column(w) - part(bias, 3),
             ),
             Equation(
                 "acceleration of the point of Q's carrier at P",
-                seen,
-                part(motion, 6) - 2 * own * column(v) - part(bias, 0),
+                acceleration,
+                part(motion, 6) - 2 * spin * column(v) - part(bias, 0),
             ),
-            Equation("all of it", _OF_Q.symbol, stack(turning, rate, seen)),
+            Equation("all of it", _OF_Q.symbol, stack(turning, rate, acceleration)),
         ),
         sources=SOURCES,
     )
@@ -104,20 +106,20 @@ def tangent_carrier(nu: int) -> Derivation:
 _NOTHING = sp.ImmutableDenseMatrix(sp.zeros(3, 1))
 
 
-def _along(
+def _direction_equations(
     v: sp.MatrixBase,
     w: sp.MatrixSymbol,
     d_v: sp.MatrixBase,
     d_w: sp.Basic,
     d_c: tuple[sp.Basic, sp.Basic],
-    place: sp.MatrixBase | None = None,
+    displacement: sp.MatrixBase | None = None,
 ) -> tuple[Equation, ...]:
-    """B and G by the changes of what is across the hinge."""
+    """B and G from the changes across the hinge."""
     turn = tilde(column(TURN.symbol))
-    place = column(PLACE.symbol) if place is None else place
-    turning, rate, seen = (part(_OF_Q.symbol, 3 * k) for k in range(3))
+    displacement = column(PLACE.symbol) if displacement is None else displacement
+    turning, rate, acceleration = (part(_OF_Q.symbol, 3 * k) for k in range(3))
     d_turning = symbol("dw_Q", 3)
-    relative, own = tilde(column(w)), tilde(turning)
+    relative, spin = tilde(column(w)), tilde(turning)
     force, moment = part(_LOAD.symbol, 0), part(_LOAD.symbol, 3)
     b, g = (quantity.symbol for quantity in _COLUMN)
     return (
@@ -127,20 +129,22 @@ def _along(
             b,
             stack(
                 d_w + d_turning,
-                d_c[1] - turn * rate - relative * d_turning + own * d_w,
+                d_c[1] - turn * rate - relative * d_turning + spin * d_w,
                 d_c[0]
-                - turn * seen
-                + tilde(rate) * place
-                + own * (own * place)
-                + 2 * (own * d_v - tilde(v) * d_turning),
+                - turn * acceleration
+                + tilde(rate) * displacement
+                + spin * (spin * displacement)
+                + 2 * (spin * d_v - tilde(v) * d_turning),
             ),
         ),
-        Equation("G", g, stack(turn * force, turn * moment + tilde(place) * force)),
+        Equation("G", g, stack(turn * force, turn * moment + tilde(displacement) * force)),
     )
 
 
-def _row(nu: int, own: sp.Basic | None) -> tuple[tuple[Quantity, ...], Quantity, Equation]:
-    """Slopes of a hinge's rows by load, rotors and laws: further inputs, output, equation."""
+def _row_derivative(
+    nu: int, load_part: sp.Basic | None
+) -> tuple[tuple[Quantity, ...], Quantity, Equation]:
+    """Derivatives of a hinge's rows by load, rotors and laws: inputs, output, equation."""
     rotor, d_s, laws, row = (symbol(name, nu) for name in ("J", "d_s", "laws", "row"))
     rotors = sp.ImmutableDenseMatrix(nu, 1, lambda k, _: rotor[k, 0] * d_s[k, 0])
     return (
@@ -149,12 +153,14 @@ def _row(nu: int, own: sp.Basic | None) -> tuple[tuple[Quantity, ...], Quantity,
             Quantity(laws, "", "change of the laws' efforts"),
         ),
         Quantity(row, "", "change of the rows by load, rotors and laws"),
-        Equation("change of the rows", row, (rotors if own is None else own + rotors) - laws),
+        Equation(
+            "change of the rows", row, (rotors if load_part is None else load_part + rotors) - laws
+        ),
     )
 
 
 def tangent_column(nu: int) -> Derivation:
-    """B, G and the load's share of W along one direction of a hinge, seen in body axes.
+    """B, G and the load part of W along one direction of a hinge, body axes.
 
     With theta the turn of the body along the direction, x its change of place R^T dd and the motion
     of Q in body axes (`tangent_carrier`):
@@ -171,16 +177,18 @@ def tangent_column(nu: int) -> Derivation:
         ("v", 3), ("w", 3), ("d_v", 3), ("d_w", 3), ("d_c", 6)
     ))  # fmt: skip
     d_bias = symbol("dc_s", 6)
-    more, row, rows = _row(nu, d_h.T * _LOAD.symbol)
+    row_inputs, row, rows = _row_derivative(nu, d_h.T * _LOAD.symbol)
     equations = (
         Equation("slope of the own acceleration", d_bias, d_c + d_h * s + h * d_s if nu else d_c),
-        *_along(column(v), w, column(d_v), column(d_w), (part(d_bias, 0), part(d_bias, 3))),
+        *_direction_equations(
+            column(v), w, column(d_v), column(d_w), (part(d_bias, 0), part(d_bias, 3))
+        ),
     )
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {nu} speeds",
         (TURN, PLACE, *map(Quantity, (h, s, v, w)), _OF_Q, _LOAD,
-         *map(Quantity, (d_h, d_v, d_w, d_c, d_s)), *more),
+         *map(Quantity, (d_h, d_v, d_w, d_c, d_s)), *row_inputs),
         (*_COLUMN, row),
         (*equations, rows) if nu else equations,
         sources=SOURCES,
@@ -188,27 +196,28 @@ def tangent_column(nu: int) -> Derivation:
 
 
 def tangent_steady(nu: int) -> Derivation:
-    """`tangent_column` of a hinge whose H is the same in every position: c = [w x v; 0]."""
+    """`tangent_column` of a hinge with constant H: c = [w x v; 0]."""
     h, v, w = symbol("H", 6, nu), symbol("v", 3), symbol("w", 3)
     d_u, d_s = symbol("d_u", nu), symbol("d_s", nu)
     d_v, d_w, d_bias = symbol("d_v", 3), symbol("d_w", 3), symbol("dc_s", 6)
-    more, row, rows = _row(nu, None)
-    own = symbol("own", 6)
-    turned = tilde(column(d_w)) * column(v) + tilde(column(w)) * column(d_v)
+    row_inputs, row, rows = _row_derivative(nu, None)
+    own_acceleration = symbol("own", 6)
+    linear_part = tilde(column(d_w)) * column(v) + tilde(column(w)) * column(d_v)
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {free_speeds(nu)}, whose subspace is constant",
         (TURN, PLACE, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
-         *map(Quantity, (d_u, d_s)), *more),
+         *map(Quantity, (d_u, d_s)), *row_inputs),
         (*_COLUMN, row),
         (
             Equation("slope of v", d_v, h[:3, :] * d_u),
             Equation("slope of w", d_w, h[3:, :] * d_u),
-            Equation("H ds", own, h * d_s),
+            Equation("H ds", own_acceleration, h * d_s),
             Equation(
-                "slope of the own acceleration", d_bias, stack(part(own, 0) + turned, part(own, 3))
+                "slope of the own acceleration", d_bias,
+                stack(part(own_acceleration, 0) + linear_part, part(own_acceleration, 3)),
             ),
-            *_along(
+            *_direction_equations(
                 column(v), w, column(d_v), column(d_w), (part(d_bias, 0), part(d_bias, 3))
             ),
             rows,
@@ -218,19 +227,21 @@ def tangent_steady(nu: int) -> Derivation:
 
 
 def tangent_turning(nu: int) -> Derivation:
-    """`tangent_steady` of a hinge that turns alone: its v, H_v and change of place are zero."""
+    """`tangent_steady` of a hinge that only rotates: v, H_v and displacement are zero."""
     h, w, d_u, d_s = symbol("H", 6, nu), symbol("w", 3), symbol("d_u", nu), symbol("d_s", nu)
-    d_w, own = symbol("d_w", 3), symbol("own", 3)
-    more, row, rows = _row(nu, None)
+    d_w, own_acceleration = symbol("d_w", 3), symbol("own", 3)
+    row_inputs, row, rows = _row_derivative(nu, None)
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {free_speeds(nu)}, which turns about constant axes",
-        (TURN, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *more),
+        (TURN, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *row_inputs),
         (*_COLUMN, row),
         (
             Equation("slope of w", d_w, h[3:, :] * d_u),
-            Equation("H_w ds", own, h[3:, :] * d_s),
-            *_along(_NOTHING, w, _NOTHING, column(d_w), (_NOTHING, column(own)), _NOTHING),
+            Equation("H_w ds", own_acceleration, h[3:, :] * d_s),
+            *_direction_equations(
+                _NOTHING, w, _NOTHING, column(d_w), (_NOTHING, column(own_acceleration)), _NOTHING
+            ),
             rows,
         ),
         sources=SOURCES,
@@ -240,8 +251,8 @@ def tangent_turning(nu: int) -> Derivation:
 # --- the unknowns of a hinge --------------------------------------------------------------------
 
 
-def _hinge(nu: int) -> dict[str, Quantity]:
-    """What is kept of a hinge with `nu` free speeds; arrays with a row for each."""
+def _hinge_quantities(nu: int) -> dict[str, Quantity]:
+    """Stored quantities of a hinge with `nu` free speeds; arrays with a row for each."""
     sizes = {
         "H": (6, nu, "motion subspace of the unknowns"),
         "B": (nu, 9, "motion along the unknowns"),
@@ -263,7 +274,7 @@ def _hinge(nu: int) -> dict[str, Quantity]:
 
 def tangent_rows(nu: int) -> Derivation:
     """D = H^T S B + W of a hinge, and its rows by the motion."""
-    at = _hinge(nu)
+    at = _hinge_quantities(nu)
     h, b, w, k, d, right = (at[name] for name in ("H", "B", "W", "K", "D", "right"))
     unit = Quantity(symbol("one", nu, nu), "", "unit matrix")
     s = ROWS_S.symbol
@@ -283,8 +294,8 @@ def tangent_rows(nu: int) -> Derivation:
 
 
 def tangent_reduce(nu: int) -> Derivation:
-    """S without the unknowns of a hinge."""
-    at = _hinge(nu)
+    """S after elimination of the unknowns of a hinge."""
+    at = _hinge_quantities(nu)
     inverse, right, k, g, v, gain = (
         at[name] for name in ("inverse", "right", "K", "G", "V", "gain")
     )
@@ -304,23 +315,26 @@ def tangent_reduce(nu: int) -> Derivation:
 
 
 def tangent_push(nu: int, known: bool = False) -> Derivation:
-    """y = D^-1 (-e_f - H^T e), and the load e + V y (+ what is `known`) carried to the parent."""
-    at = _hinge(nu)
+    """y = D^-1 (-e_f - H^T e), and the load e + V y carried to the parent.
+
+    With `known`, the load of known increments is added.
+    """
+    at = _hinge_quantities(nu)
     h, v, inverse, y = (at[name] for name in ("H", "V", "inverse", "y"))
-    own = Quantity(symbol("e_f", nu), "", "load of the rows")
+    load_rows = Quantity(symbol("e_f", nu), "", "load of the rows")
     onward = symbol("e_c", 6)
     carried = E.symbol + v.symbol.T * y.symbol
     return Derivation(
         f"generic{nu}",
         f"a right-hand side carried across a hinge with {free_speeds(nu)}"
         + (" and increments that are known" if known else ""),
-        (R, SHIFT, h, v, inverse, E, own, *((KNOWN_LOAD,) if known else ())),
+        (R, SHIFT, h, v, inverse, E, load_rows, *((KNOWN_LOAD,) if known else ())),
         (y, PARENT_E),
         (
             Equation(
                 "D^-1 (-e_f - H^T e)",
                 y.symbol,
-                inverse.symbol * (-own.symbol - h.symbol.T * E.symbol),
+                inverse.symbol * (-load_rows.symbol - h.symbol.T * E.symbol),
             ),
             Equation("e + V y", onward, carried + KNOWN_LOAD.symbol if known else carried),
             Equation("X^T (e + V y)", PARENT_E.symbol, transport(onward)),
@@ -330,16 +344,19 @@ def tangent_push(nu: int, known: bool = False) -> Derivation:
 
 
 def tangent_push_known(nu: int) -> Derivation:
-    """`tangent_push` where increments of the hinge are known."""
+    """`tangent_push` with known increments of the hinge."""
     return tangent_push(nu, known=True)
 
 
 def tangent_answer(nu: int, known: bool = False) -> Derivation:
-    """x = y - D^-1 H^T S z of a hinge, z = Th z_I (+ what is `known`), and z + B x behind it."""
-    at = _hinge(nu)
+    """x = y - D^-1 H^T S z of a hinge, z = Th z_I, and the motion z + B x of the body.
+
+    With `known`, the known motion is added to z.
+    """
+    at = _hinge_quantities(nu)
     b, gain, y = (at[name] for name in ("B", "gain", "y"))
     unknowns = Quantity(symbol("x", nu), "", "unknowns")
-    moved = symbol("z_c", 9)
+    motion = symbol("z_c", 9)
     first, carried = outboard_motion()
     return Derivation(
         f"generic{nu}",
@@ -349,14 +366,14 @@ def tangent_answer(nu: int, known: bool = False) -> Derivation:
         (unknowns, Z),
         (
             first,
-            Equation("Th z_I", moved, carried + KNOWN.symbol if known else carried),
-            Equation("x", unknowns.symbol, y.symbol - gain.symbol * moved),
-            Equation("z", Z.symbol, moved + b.symbol.T * unknowns.symbol),
+            Equation("Th z_I", motion, carried + KNOWN.symbol if known else carried),
+            Equation("x", unknowns.symbol, y.symbol - gain.symbol * motion),
+            Equation("z", Z.symbol, motion + b.symbol.T * unknowns.symbol),
         ),
         sources=SOURCES,
     )
 
 
 def tangent_answer_known(nu: int) -> Derivation:
-    """`tangent_answer` where increments of the hinge are known."""
+    """`tangent_answer` with known increments of the hinge."""
     return tangent_answer(nu, known=True)

@@ -1,24 +1,25 @@
-"""The tangent where loads change with the place of their body: nine more numbers of motion.
+"""Tangent of position-dependent loads: nine more components of motion.
 
-Loads in the axes of space, force elements to the ground and drag change with where a body is and
-how fast it goes.  Behind the hinges that lead to them the load then changes by
+Loads in inertial axes, force elements to the ground and drag depend on position and velocity of
+their body.  Outboard of the hinges that lead to them the load then changes by
 
     df = S z + S_p p + e,      p = [psi; r; v],
 
-the turn of the body, the change of place of its P and that of its velocity, in body axes, beside z
-of `tangent`.  Across a hinge, with theta and x the turn and the change of place along an unknown,
+the rotation of the body, the displacement of its P and the change of its velocity, in body axes, in
+addition to z of `tangent_sweep`.  Across a hinge, with theta and x the rotation and the
+displacement along an unknown,
 
     p = Th_p p_I + Th_z z_I + B_p x,    Th_p p_I + Th_z z_I = [R^T psi;  R^T (r - r~ psi);
                                                                 R^T (v - r~ dw)],
     B_p = [theta;  x;  dv_rel - theta~ (v - v_rel) + w_Q~ x]
 
-so that the elimination of `tangent` goes on with further columns of the same kind:
+so that the elimination of `tangent_sweep` has further columns of the same kind:
 
     K = S B + S_p B_p,    S_p,I += X^T (S_p - V D^-1 H^T S_p) Th_p,    S_I += X^T (...) Th_z,
     x = y - D^-1 H^T (S z + S_p p)
 
-The kernels here go beside those of `tangent` and `tangent_hinge`: of a hinge, S_p B_p is added to G
-and H^T S_p B_p to W beforehand, of a flexible body to its own load and rows.
+The kernels here complement those of `tangent_sweep` and `tangent_hinge_elimination`: for a hinge,
+S_p B_p is added to G and H^T S_p B_p to W beforehand, for a flexible body to its own load and rows.
 """
 
 from __future__ import annotations
@@ -39,36 +40,36 @@ _GAIN = Quantity(sp.MatrixSymbol("gain", N, 9), "", "D^-1 times the rows by the 
 _OWN_ROWS = Quantity(sp.MatrixSymbol("Z_p", 9, N), "", "own rows by the place, a row an entry")
 
 
-def _moved() -> sp.BlockMatrix:
+def _carried_displacement() -> sp.BlockMatrix:
     """Th_p p_I + Th_z z_I."""
-    turn, place, velocity = (part(_P_PARENT.symbol, 3 * k) for k in range(3))
+    turn, position, velocity = (part(_P_PARENT.symbol, 3 * k) for k in range(3))
     lever, spin = tilde(column(SHIFT.symbol)), part(Z_PARENT.symbol, 0)
     return stack(
         R.symbol.T * turn,
-        R.symbol.T * (place - lever * turn),
+        R.symbol.T * (position - lever * turn),
         R.symbol.T * (velocity - lever * spin),
     )
 
 
 def placed_moved() -> Derivation:
-    """p behind a hinge by the motion of the parent alone."""
+    """p of the outboard body from the motion of the parent."""
     return Derivation(
         "frames",
         "change of a body's place by the motion of its parent",
         (R, SHIFT, Z_PARENT, _P_PARENT),
         (P,),
-        (Equation("Th_p p_I + Th_z z_I", P.symbol, _moved()),),
+        (Equation("Th_p p_I + Th_z z_I", P.symbol, _carried_displacement()),),
         sources=SOURCES,
     )
 
 
 def placed_pose() -> Derivation:
-    """Axes, place and velocity of a body by a change of its place."""
+    """Changes of axes, position and velocity of a body by its displacement."""
     axes = Quantity(symbol("A", 3, 3), "", "axes, body to inertial")
     d_axes = Quantity(symbol("d_A", 3, 3), "", "their change")
     d_place = Quantity(vector("d_x", 3), "m", "change of place of P, inertial axes")
     d_velocity = Quantity(vector("d_v", 3), "m/s", "change of velocity of P, own axes")
-    turn, place, velocity = (part(P.symbol, 3 * k) for k in range(3))
+    turn, position, velocity = (part(P.symbol, 3 * k) for k in range(3))
     return Derivation(
         "frames",
         "pose and velocity by a change of place",
@@ -76,7 +77,7 @@ def placed_pose() -> Derivation:
         (d_axes, d_place, d_velocity),
         (
             Equation("A psi~", d_axes.symbol, axes.symbol * tilde(turn)),
-            Equation("A r", d_place.symbol, axes.symbol * place),
+            Equation("A r", d_place.symbol, axes.symbol * position),
             Equation("v", d_velocity.symbol, velocity),
         ),
         sources=SOURCES,
@@ -88,52 +89,54 @@ def placed_column() -> Derivation:
     velocity = Quantity(vector("v_P", 3), "m/s", "velocity of P, own axes")
     d_v = Quantity(vector("d_v", 3), "m/s", "change of the relative velocity")
     of_q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w first")
-    turn, place = column(TURN.symbol), column(PLACE.symbol)
+    turn, position = column(TURN.symbol), column(PLACE.symbol)
     carried = sp.ImmutableDenseMatrix(column(velocity.symbol) - column(V_REL.symbol))
-    along = column(d_v.symbol) - tilde(turn) * carried + tilde(part(of_q.symbol, 0)) * place
+    velocity_change = (
+        column(d_v.symbol) - tilde(turn) * carried + tilde(part(of_q.symbol, 0)) * position
+    )
     return Derivation(
         "frames",
         "change of place along a direction",
         (TURN, PLACE, velocity, V_REL, d_v, of_q),
         (Quantity(symbol("B_p", 9), "", "change of place along the direction"),),
-        (Equation("B_p", symbol("B_p", 9), stack(turn, place, along)),),
+        (Equation("B_p", symbol("B_p", 9), stack(turn, position, velocity_change)),),
         sources=SOURCES,
     )
 
 
 def placed_carry() -> Derivation:
-    """S_p Th_p and S_p Th_z, and both with X^T added to the parent's."""
-    along = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
+    """S_p Th_p and S_p Th_z, and both carried by X^T to the parent."""
+    s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
     by_spin = Quantity(symbol("T_w", 3, 6), "", "S_p Th_z by angular velocity", accumulate=True)
     to_place = Quantity(symbol("S_pI", 9, 6), "", "that of the parent", accumulate=True)
     to_spin = Quantity(symbol("S_wI", 3, 6), "", "the parent's S, of it that", accumulate=True)
     s = _ROWS_S.symbol.T
-    turn, place, velocity = (s[:, 3 * k : 3 * k + 3] for k in range(3))
+    turn, position, velocity = (s[:, 3 * k : 3 * k + 3] for k in range(3))
     t_turn, t_place, t_velocity, t_spin = (
         symbol(f"T_{name}", 6, 3) for name in ("psi", "r", "v", "dw")
     )
     lever = tilde(column(SHIFT.symbol))
-    whole, pushed = symbol("T_all", 6, 12), symbol("push", 3, 12)
+    total, pushed = symbol("T_all", 6, 12), symbol("push", 3, 12)
     carried = symbol("carried", 6, 12)
-    moment = R.symbol * whole[3:, :] + lever * pushed
+    moment = R.symbol * total[3:, :] + lever * pushed
     return Derivation(
         "frames",
         "change of a load by place carried to the parent",
         (R, SHIFT, _ROWS_S),
-        (along, by_spin, to_place, to_spin),
+        (s_th, by_spin, to_place, to_spin),
         (
-            Equation("by place", t_place, place * R.symbol.T),
+            Equation("by place", t_place, position * R.symbol.T),
             Equation("by turn", t_turn, turn * R.symbol.T - t_place * lever),
             Equation("by velocity", t_velocity, velocity * R.symbol.T),
             Equation("by angular velocity", t_spin, -(t_velocity * lever)),
             Equation(
                 "S_p [Th_p, Th_z]",
-                whole,
+                total,
                 sp.BlockMatrix([[t_turn, t_place, t_velocity, t_spin]]),
             ),
-            Equation("S_p Th_p, by rows", along.symbol, whole[:, :9].T),
-            Equation("S_p Th_z, by rows", by_spin.symbol, whole[:, 9:].T),
-            Equation("forces, parent axes", pushed, R.symbol * whole[:3, :]),
+            Equation("S_p Th_p, by rows", s_th.symbol, total[:, :9].T),
+            Equation("S_p Th_z, by rows", by_spin.symbol, total[:, 9:].T),
+            Equation("forces, parent axes", pushed, R.symbol * total[:3, :]),
             Equation("X^T S_p [Th_p, Th_z]", carried, sp.BlockMatrix([[pushed], [moment]])),
             Equation("X^T S_p Th_p", to_place.symbol, carried[:, :9].T),
             Equation("X^T S_p Th_z", to_spin.symbol, carried[:, 9:].T),
@@ -143,19 +146,19 @@ def placed_carry() -> Derivation:
 
 
 def placed_known() -> Derivation:
-    """What a change of place that is known adds to `tangent_known`."""
-    known = Quantity(symbol("b_p", 9), "", "change of place that is known")
-    felt = Quantity(symbol("e_S", 6), "N, N*m", "load by what is known", accumulate=True)
+    """Contribution of a known displacement to `tangent_known`."""
+    displacement = Quantity(symbol("b_p", 9), "", "change of place that is known")
+    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load by what is known", accumulate=True)
     carried = Quantity(symbol("e_b", 6), "N, N*m", "the same, as it is carried", accumulate=True)
     load = symbol("e_p", 6)
     return Derivation(
         "frames",
         "load by a change of place that is known",
-        (_ROWS_S, known),
-        (felt, carried),
+        (_ROWS_S, displacement),
+        (load_rows, carried),
         (
-            Equation("S_p b_p", load, _ROWS_S.symbol.T * known.symbol),
-            Equation("to what is felt", felt.symbol, load),
+            Equation("S_p b_p", load, _ROWS_S.symbol.T * displacement.symbol),
+            Equation("to what is felt", load_rows.symbol, load),
             Equation("to what is carried", carried.symbol, load),
         ),
         sources=SOURCES,
@@ -166,7 +169,7 @@ def placed_known() -> Derivation:
 
 
 def placed_rows() -> Derivation:
-    """Rows of a hinge by place."""
+    """Rows of a hinge by displacement."""
     rows = Quantity(_OWN_ROWS.symbol, "", "rows by the place, a row an entry")
     return Derivation(
         "tangent",
@@ -179,7 +182,7 @@ def placed_rows() -> Derivation:
 
 
 def placed_own() -> Derivation:
-    """What the place that the unknowns bring a body to adds to the load and to rows."""
+    """Contribution of the displacement along the unknowns to load and rows."""
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(OWN_D.symbol, accumulate=True)
     return Derivation(
@@ -196,7 +199,7 @@ def placed_own() -> Derivation:
 
 
 def placed_reduce() -> Derivation:
-    """S_p without the unknowns of a hinge."""
+    """S_p after elimination of the unknowns of a hinge."""
     inverse = Quantity(sp.MatrixSymbol("inverse", N, N), "", "D^-1")
     v = Quantity(sp.MatrixSymbol("V", N, 6), "", "K + G, a row a direction")
     change = Quantity(_ROWS_S.symbol, "", _ROWS_S.meaning, accumulate=True)
@@ -214,7 +217,7 @@ def placed_reduce() -> Derivation:
 
 
 def placed_node() -> Derivation:
-    """S_p without the unknowns of a flexible body."""
+    """S_p after elimination of the unknowns of a flexible body."""
     right = Quantity(sp.MatrixSymbol("right", N, 9), "", "rows by the place")
     without = Quantity(symbol("S_c", 9, 6), "", "S_p without the unknowns, a row an entry")
     return Derivation(
@@ -236,25 +239,25 @@ def placed_node() -> Derivation:
 
 
 def placed_absorb() -> Derivation:
-    """What `absorb` leaves out: loads by place of what hangs on a port of a flexible body."""
-    along = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
+    """Complement of `absorb`: position-dependent loads outboard of a port of a flexible body."""
+    s_th = Quantity(symbol("T_p", 9, 6), "", "S_p Th_p, a row an entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(_OWN_ROWS.symbol, accumulate=True)
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
     k = sp.MatrixSymbol("K_x", 6, N)
     pushed = sp.MatrixSymbol("force", 3, N)
     lever = tilde(column(SHIFT.symbol))
-    felt = sp.BlockMatrix([[pushed.T, (R.symbol * k[3:, :] + lever * pushed).T]])
+    parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * k[3:, :] + lever * pushed).T]])
     return Derivation(
         "tangent",
         "loads by place of what hangs on a port, as the unknowns of its body see them",
-        (R, SHIFT, H, _B, _ROWS_S, along),
+        (R, SHIFT, H, _B, _ROWS_S, s_th),
         (load, rows, by_unknowns),
         (
             Equation("S_p B_p", k, _ROWS_S.symbol.T * _B.symbol.T),
             Equation("force of S_p B_p", pushed, R.symbol * k[:3, :]),
-            Equation("X^T S_p B_p", load.symbol, felt),
-            Equation("H^T S_p Th_p", rows.symbol, along.symbol * H.symbol),
+            Equation("X^T S_p B_p", load.symbol, parent_load),
+            Equation("H^T S_p Th_p", rows.symbol, s_th.symbol * H.symbol),
             Equation("H^T S_p B_p", by_unknowns.symbol, k.T * H.symbol),
         ),
         sources=SOURCES,
@@ -262,13 +265,13 @@ def placed_absorb() -> Derivation:
 
 
 def placed_left() -> Derivation:
-    """y less what the place makes of the rows."""
-    left = Quantity(ANSWER.symbol, "", "what is left of the rows", accumulate=True)
+    """y less the contribution of the displacement to the rows."""
+    result = Quantity(ANSWER.symbol, "", "what is left of the rows", accumulate=True)
     return Derivation(
         "tangent",
         "rows less what the change of place makes of them",
         (_GAIN, P),
-        (left,),
-        (Equation("- D^-1 H^T S_p p", left.symbol, -(_GAIN.symbol * P.symbol)),),
+        (result,),
+        (Equation("- D^-1 H^T S_p p", result.symbol, -(_GAIN.symbol * P.symbol)),),
         sources=SOURCES,
     )

@@ -1,33 +1,32 @@
-"""The exact tangent of inverse dynamics, eliminated from the tips to the root.
+"""Exact tangent of inverse dynamics, eliminated from the tips to the root.
 
-Let every hinge have unknowns x along which its coordinates, speeds and accelerations change
-together, as a step of an implicit method wants it.  Behind a hinge the load f at P of a body
-changes by
+Every hinge has unknowns x along which its coordinates, speeds and accelerations change together, as
+in a step of an implicit method.  Outboard of a hinge the load f at P of a body changes by
 
     df = S z + e,      z = [dw; dwd; da],
 
-the changes of angular velocity, of angular acceleration and of acceleration (gravity inside it) in
-body axes.  Nine numbers, for the hinge axes turn with the body: the three are different images of
-the unknowns inboard.  Position, attitude and velocity drop out, all components being those of the
-body.  Across a hinge
+the changes of angular velocity, of angular acceleration and of acceleration (including gravity) in
+body axes.  These are nine numbers because the hinge axes rotate with the body: the three depend
+differently on the inboard unknowns.  Position, attitude and velocity drop out, as all components
+are in body axes.  Across a hinge
 
     z = Th z_I + B x,      f_I = X^T f,      dX^T f = X^T G x,      rows: H^T df + W x = r
 
-(Th, X: motion and load carried by the hinge as it stands; B, G, W: their slopes along x, which come
-from the hinge's own kernel differentiated), so that with K = S B
+(Th, X: motion and load carried across the hinge in its current position; B, G, W: their derivatives
+along x, from the hinge's own differentiated kernel), so that with K = S B
 
     D = H^T K + W,      S_I += X^T (S - (K + G) D^-1 H^T S) Th,
                         e_I += X^T (e + (K + G) D^-1 (r - H^T e))
 
 Where parts of the increments are known beforehand (stages of a method), b is the motion and g the
-load that they make of one hinge, z = Th z_I + b + B x, and w what they make of its rows; with S_c
-what is carried on in place of S,
+load that they cause at one hinge, z = Th z_I + b + B x, and w their contribution to its rows; with
+S_c the matrix carried on in place of S,
 
     y = D^-1 (r - w - H^T e),   e_I += X^T (e + V y + S_c b + g),   x = y - D^-1 H^T S (Th z_I + b)
 
-Modal coordinates are unknowns of the same kind, whose body adds a load K x of its own and rows of
-its own.  Arrays with a column per unknown or per entry of z are kept with a row for each, as they
-are made one direction at a time.
+Modal coordinates are unknowns of the same kind, whose body adds a load K x and rows of its own.
+Arrays with a column per unknown or per entry of z are stored with a row for each, because they are
+computed one direction at a time.
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ Z = Quantity(vector("z", 9), "", "change of the body's motion, own axes")
 ROWS_S = Quantity(symbol("S", 9, 6), "", "change of the load by that of the motion, a row an entry")
 
 
-def _spun() -> sp.ImmutableDenseMatrix:
+def _spin_acceleration() -> sp.ImmutableDenseMatrix:
     """Acceleration of P by the parent's change of angular velocity: (w x r)~ + w~ r~."""
     w, r = column(TURN_PARENT.symbol), column(SHIFT.symbol)
     return sp.ImmutableDenseMatrix(tilde(tilde(w) * r) + tilde(w) * tilde(r))
@@ -62,37 +61,37 @@ def _spun() -> sp.ImmutableDenseMatrix:
 
 def tangent_carry() -> Derivation:
     """S Th, and X^T S Th added to the parent's S."""
-    along = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    s_th = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
     parent = Quantity(symbol("S_I", 9, 6), "", "that of the parent", accumulate=True)
     s = ROWS_S.symbol.T
     turn, rate, linear = (s[:, 3 * k : 3 * k + 3] for k in range(3))
     t_turn, t_rate, t_linear = (symbol(f"T_{name}", 6, 3) for name in ("w", "wd", "a"))
-    velocity, turned = symbol("v_I", 3), symbol("T_turn", 3, 3)
+    velocity, t_rotation = symbol("v_I", 3), symbol("T_turn", 3, 3)
     relative, lever = tilde(column(W_REL.symbol)), tilde(column(SHIFT.symbol))
-    whole, pushed = symbol("T_all", 6, 9), symbol("push", 3, 9)
-    moment = R.symbol * whole[3:, :] + lever * pushed
+    total, pushed = symbol("T_all", 6, 9), symbol("push", 3, 9)
+    moment = R.symbol * total[3:, :] + lever * pushed
     return Derivation(
         "frames",
         "change of a load carried to the parent",
         (R, SHIFT, TURN_PARENT, V_REL, W_REL, ROWS_S),
-        (along, parent),
+        (s_th, parent),
         (
             Equation("relative velocity, parent axes", velocity, R.symbol * V_REL.symbol),
             Equation(
                 "acceleration of P by the parent's change of angular velocity",
-                turned,
-                _spun() + 2 * tilde(column(velocity)),
+                t_rotation,
+                _spin_acceleration() + 2 * tilde(column(velocity)),
             ),
             Equation("by acceleration", t_linear, linear * R.symbol.T),
             Equation("by angular acceleration", t_rate, rate * R.symbol.T - t_linear * lever),
             Equation(
                 "by angular velocity",
                 t_turn,
-                (turn - rate * relative) * R.symbol.T - t_linear * turned,
+                (turn - rate * relative) * R.symbol.T - t_linear * t_rotation,
             ),
-            Equation("S Th", whole, sp.BlockMatrix([[t_turn, t_rate, t_linear]])),
-            Equation("S Th, by rows", along.symbol, whole.T),
-            Equation("forces, parent axes", pushed, R.symbol * whole[:3, :]),
+            Equation("S Th", total, sp.BlockMatrix([[t_turn, t_rate, t_linear]])),
+            Equation("S Th, by rows", s_th.symbol, total.T),
+            Equation("forces, parent axes", pushed, R.symbol * total[:3, :]),
             Equation("X^T S Th", parent.symbol, sp.BlockMatrix([[pushed.T, moment.T]])),
         ),
         sources=SOURCES,
@@ -100,28 +99,28 @@ def tangent_carry() -> Derivation:
 
 
 def outboard_motion() -> tuple[Equation, sp.BlockMatrix]:
-    """Th z_I, and the equation that it needs before."""
+    """Th z_I, and the equation that precedes it."""
     turn, rate, linear = (part(Z_PARENT.symbol, 3 * k) for k in range(3))
     lever = tilde(column(SHIFT.symbol))
-    seen = symbol("dw", 3)
+    dw = symbol("dw", 3)
     relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
-    moved = linear - lever * rate - _spun() * turn
-    return Equation("change of the angular velocity", seen, R.symbol.T * turn), stack(
-        seen,
-        R.symbol.T * rate - relative * seen,
-        R.symbol.T * moved - 2 * (velocity * seen),
+    acceleration = linear - lever * rate - _spin_acceleration() * turn
+    return Equation("change of the angular velocity", dw, R.symbol.T * turn), stack(
+        dw,
+        R.symbol.T * rate - relative * dw,
+        R.symbol.T * acceleration - 2 * (velocity * dw),
     )
 
 
 def tangent_moved() -> Derivation:
-    """Th z_I: change of the body's motion by that of its parent's alone."""
-    first, moved = outboard_motion()
+    """Th z_I: change of the body's motion by that of its parent."""
+    first, motion = outboard_motion()
     return Derivation(
         "frames",
         "change of a body's motion by that of its parent's",
         (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT),
         (Z,),
-        (first, Equation("Th z_I", Z.symbol, moved)),
+        (first, Equation("Th z_I", Z.symbol, motion)),
         sources=SOURCES,
     )
 
@@ -134,19 +133,20 @@ _TURNED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by
 
 
 def tangent_known() -> Derivation:
-    """S b, as rows of unknowns see it, and S b + g, as it is carried on.
+    """S b, as it enters the rows of unknowns, and S b + g, as it is carried on.
 
-    With S as it is without the unknowns, the rows of the unknowns themselves need no more than
-    z + b in place of z (see `tangent_answer`)."""
-    felt = Quantity(symbol("e_S", 6), "N, N*m", "load by the motion that is known")
+    With S after elimination of the unknowns, the rows of the unknowns only need z + b in place
+    of z (see `tangent_answer`).
+    """
+    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load by the motion that is known")
     return Derivation(
         "frames",
         "load by a motion that is known",
         (ROWS_S, KNOWN, _TURNED_LOAD),
-        (felt, KNOWN_LOAD),
+        (load_rows, KNOWN_LOAD),
         (
-            Equation("S b", felt.symbol, ROWS_S.symbol.T * KNOWN.symbol),
-            Equation("S b + g", KNOWN_LOAD.symbol, felt.symbol + _TURNED_LOAD.symbol),
+            Equation("S b", load_rows.symbol, ROWS_S.symbol.T * KNOWN.symbol),
+            Equation("S b + g", KNOWN_LOAD.symbol, load_rows.symbol + _TURNED_LOAD.symbol),
         ),
         sources=SOURCES,
     )
@@ -156,7 +156,7 @@ def tangent_known() -> Derivation:
 
 
 def _rows(name: str, width: int, meaning: str) -> Quantity:
-    """A row of `width` numbers per unknown."""
+    """Array with a row of `width` numbers per unknown."""
     return Quantity(sp.MatrixSymbol(name, N, width), "", meaning)
 
 
@@ -191,7 +191,7 @@ def invert() -> Derivation:
 
 
 def node() -> Derivation:
-    """The unknowns of a flexible body eliminated."""
+    """Elimination of the unknowns of a flexible body."""
     without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, a row an entry")
     s = ROWS_S.symbol.T
     k = symbol("K_x", 6, N)
@@ -221,8 +221,8 @@ def node() -> Derivation:
 
 
 def absorb() -> Derivation:
-    """What hangs on a port of a flexible body, as its unknowns see it."""
-    along = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    """Contribution of the bodies outboard of a port to the unknowns of a flexible body."""
+    s_th = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(OWN_ROWS.symbol, accumulate=True)
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
@@ -230,18 +230,18 @@ def absorb() -> Derivation:
     force, moment = symbol("force", 3, N), symbol("moment", 3, N)
     pushed = R.symbol * force
     lever = tilde(column(SHIFT.symbol))
-    felt = sp.BlockMatrix([[pushed.T, (R.symbol * moment + lever * pushed).T]])
+    parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * moment + lever * pushed).T]])
     return Derivation(
         "tangent",
         "what hangs on a port, as the unknowns of its body see it",
-        (R, SHIFT, H, B, G, W, ROWS_S, along),
+        (R, SHIFT, H, B, G, W, ROWS_S, s_th),
         (k, load, rows, by_unknowns),
         (
             Equation("S B", k.symbol, ROWS_S.symbol.T * B.symbol.T),
             Equation("force of K + G", force, k.symbol[:3, :] + G.symbol[:, :3].T),
             Equation("moment of K + G", moment, k.symbol[3:, :] + G.symbol[:, 3:].T),
-            Equation("X^T (K + G)", load.symbol, felt),
-            Equation("H^T S Th", rows.symbol, along.symbol * H.symbol),
+            Equation("X^T (K + G)", load.symbol, parent_load),
+            Equation("H^T S Th", rows.symbol, s_th.symbol * H.symbol),
             Equation("H^T K + W", by_unknowns.symbol, k.symbol.T * H.symbol + W.symbol),
         ),
         sources=SOURCES,
@@ -250,17 +250,17 @@ def absorb() -> Derivation:
 
 def push() -> Derivation:
     """One right-hand side: y = D^-1 (-e_f - H^T e), and the load e + V y."""
-    own = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows")
-    rest = Quantity(sp.MatrixSymbol("rest", N, 1), "", "what is left of the rows")
+    load_rows = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows")
+    right_side = Quantity(sp.MatrixSymbol("rest", N, 1), "", "what is left of the rows")
     load = Quantity(symbol("e_c", 6), "N, N*m", "load without the unknowns")
     return Derivation(
         "tangent",
         "unknowns eliminated from a right-hand side",
-        (H, V, D, E, own),
-        (rest, ANSWER, load),
+        (H, V, D, E, load_rows),
+        (right_side, ANSWER, load),
         (
-            Equation("-e_f - H^T e", rest.symbol, -own.symbol - H.symbol.T * E.symbol),
-            Equation("D^-1 (-e_f - H^T e)", ANSWER.symbol, Solve(D.symbol, rest.symbol)),
+            Equation("-e_f - H^T e", right_side.symbol, -load_rows.symbol - H.symbol.T * E.symbol),
+            Equation("D^-1 (-e_f - H^T e)", ANSWER.symbol, Solve(D.symbol, right_side.symbol)),
             Equation("e + V y", load.symbol, E.symbol + V.symbol * ANSWER.symbol),
         ),
         sources=SOURCES,
@@ -286,7 +286,7 @@ BEHIND = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' 
 
 
 def answer() -> Derivation:
-    """x = y - D^-1 H^T S z, and the motion with the unknowns' part."""
+    """x = y - D^-1 H^T S z, and the motion including that of the unknowns."""
     return Derivation(
         "tangent",
         "unknowns that answer a right-hand side",
@@ -301,7 +301,7 @@ def answer() -> Derivation:
 
 
 def displaced() -> Derivation:
-    """Motion of what follows the unknowns of a flexible body."""
+    """Motion of a port that follows the unknowns of a flexible body."""
     return Derivation(
         "tangent",
         "change of motion with the unknowns' part",
@@ -313,7 +313,7 @@ def displaced() -> Derivation:
 
 
 def lag() -> Derivation:
-    """Q = (sq 1 - kappa g_q)^-1 of a hinge whose rates depend on its coordinates: dq = Q (...)."""
+    """Q = (sq 1 - kappa g_q)^-1 of a hinge whose rates depend on its coordinates."""
     slopes = _square("g_q", "slopes of the rates by the coordinates, a row a direction")
     unit = _square("one", "unit matrix")
     scale = Quantity(vector("sq", 1), "1/s", "inverse time of the step")

@@ -1,12 +1,12 @@
-"""Kernels of a body from its residual: mass matrix, inertia force of the bias motion, energy.
+"""Kernels of a body from its residual: mass matrix, inertia force, energy.
 
-The residual (force and moment at the input end that a motion needs) is linear in the
+The residual (force and moment at the input end that a motion requires) is linear in the
 accelerations; its derivative is the mass matrix, its value at the bias motion the load f_bias.
 
-A body states its equations in axes and about an origin of its own, and may be held anywhere: the
-motion of the internal frame (point P, hinge axes) is carried to the body's own frame and the load
-carried back.  R_u (internal to own axes) and r_u (P from the own origin, own axes) are twelve
-numbers behind the parameters:
+A body defines its equations in its own axes and about its own origin, whichever end is its input
+end: the motion of the internal frame (point P, hinge axes) is transformed to the body's own frame
+and the load back.  R_u (internal to own axes) and r_u (P from the own origin, own axes) are twelve
+numbers after the parameters:
 
     a_O = X a_P + [w x (w x -r_u); 0],   X = [R_u  r_u~ R_u; 0  R_u],   f_P = X^T f_O
 """
@@ -21,7 +21,7 @@ from ..definition.derivation import Derivation, Equation, Quantity, tilde, vecto
 from ..definition.element import Body, Symbols, describe_array
 from .riccati_sweep import MOTION, E, S
 
-#: Numbers of R_u and r_u.
+#: Count of numbers in R_u and r_u.
 FRAME = 12
 
 
@@ -34,7 +34,7 @@ def _columns(body: Body) -> tuple[Symbols, sp.MatrixSymbol, Quantity]:
 
 
 def _frame(body: Body, array: sp.MatrixSymbol) -> tuple[sp.Matrix, sp.Matrix, sp.BlockMatrix]:
-    """(R_u, r_u~, X): from the internal frame to the body's own."""
+    """(R_u, r_u~, X): transformation from the internal frame to the body's own."""
     first = len(body.parameters)
     turn = sp.ImmutableDenseMatrix(3, 3, lambda i, j: array[first + 3 * i + j, 0])
     lever = tilde(_triple(array, first + 9))
@@ -60,7 +60,7 @@ def _accelerations() -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
 
 
 def inertia(body: Body) -> Derivation:
-    """S of the body alone: derivative of its residual by the acceleration."""
+    """S of the single body: derivative of its residual by the acceleration."""
     p, array, parameters = _columns(body)
     a, alpha, w = _accelerations()
     residual = sp.Matrix(body.residual(a, alpha, w, p))
@@ -85,7 +85,7 @@ def inertia(body: Body) -> Derivation:
 
 
 def bias_load(body: Body) -> Derivation:
-    """e of the body alone: residual at the bias motion."""
+    """e of the single body: residual at the bias motion."""
     p, array, parameters = _columns(body)
     carried = () if body.in_hinge_axes else _motion_equations(body, array)
     motion = carried[-1].left if carried else MOTION.symbol
@@ -126,18 +126,18 @@ def _mass_equations(
 ) -> tuple[Equation, ...]:
     if body.in_hinge_axes:
         return (Equation("S = d residual / d acceleration", S.symbol, mass),)
-    own, (_, _, x) = sp.MatrixSymbol("S_O", 6, 6), _frame(body, array)
+    body_mass, (_, _, x) = sp.MatrixSymbol("S_O", 6, 6), _frame(body, array)
     carry = sp.MatrixSymbol("X", 6, 6)
     return (
-        Equation("d residual / d acceleration, own frame", own, mass),
+        Equation("d residual / d acceleration, own frame", body_mass, mass),
         Equation("X", carry, x),
-        Equation("S = X^T S_O X", S.symbol, carry.T * own * carry),
+        Equation("S = X^T S_O X", S.symbol, carry.T * body_mass * carry),
     )
 
 
 def _motion_equations(body: Body, array: sp.MatrixSymbol) -> tuple[Equation, ...]:
     motion, (turn, lever, _) = MOTION.symbol, _frame(body, array)
-    w, wd, own = vector("w_O", 3), vector("wd_O", 3), vector("motion_O", 9)
+    w, wd, body_motion = vector("w_O", 3), vector("wd_O", 3), vector("motion_O", 9)
     spin = tilde(_triple(w, 0))
     minus_r = -sp.ImmutableDenseMatrix(_triple(array, len(body.parameters) + 9))
     a = turn * sp.ImmutableDenseMatrix(_triple(motion, 6)) + lever * wd + spin * (spin * minus_r)
@@ -148,7 +148,7 @@ def _motion_equations(body: Body, array: sp.MatrixSymbol) -> tuple[Equation, ...
         Equation(
             "angular acceleration, own axes", wd, turn * sp.ImmutableDenseMatrix(_triple(motion, 3))
         ),
-        Equation("bias motion of the own origin", own, sp.BlockMatrix([[w], [wd], [a]])),
+        Equation("bias motion of the own origin", body_motion, sp.BlockMatrix([[w], [wd], [a]])),
     )
 
 
@@ -157,11 +157,11 @@ def _load_equations(
 ) -> tuple[Equation, ...]:
     if body.in_hinge_axes:
         return (Equation("e = residual at the bias motion", E.symbol, residual),)
-    own, carry, (_, _, x) = vector("e_O", 6), sp.MatrixSymbol("X", 6, 6), _frame(body, array)
+    body_load, carry, (_, _, x) = vector("e_O", 6), sp.MatrixSymbol("X", 6, 6), _frame(body, array)
     return (
-        Equation("residual at the bias motion, own frame", own, residual),
+        Equation("residual at the bias motion, own frame", body_load, residual),
         Equation("X", carry, x),
-        Equation("e = X^T e_O", E.symbol, carry.T * own),
+        Equation("e = X^T e_O", E.symbol, carry.T * body_load),
     )
 
 

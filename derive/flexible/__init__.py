@@ -1,1 +1,1 @@
-"""Flexible bodies: floating-frame residual by invariants, sections as ports, local condensation."""
+"""Flexible bodies: floating-frame residual, sections as ports, local condensation."""

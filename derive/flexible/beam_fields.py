@@ -1,17 +1,17 @@
-"""Euler-Bernoulli beam: from its displacement field and its energies to the integrands per length.
+"""Euler-Bernoulli beam: integrands per length from displacement field and energies.
 
-A point of the section at x that lies at (y, z) in it moves by
+A point at (y, z) of the section at x has the displacement
 
     u = (s, v, w) + theta x (0, y, z),    theta = (psi, -w', v')
 
-s, v, w displacements of the axis, psi twist.  The section's rotation enters the inertia as `turn`:
-theta itself where rotary inertia is kept; its twist, and what the section turns with the floating
-frame, where it is left out.  Strain is that of the axis, s' - y v'' - z w'', and the rate of twist
-psi'.  What bending and twist displace and turn to second order is in `beam_second_order`.
+with displacements s, v, w of the axis and twist psi.  The rotation of the section enters the
+inertia as `turn`: theta itself with rotary inertia; without it only the twist, and the rotation of
+the section with the floating frame.  Strain is that of the axis, s' - y v'' - z w'', and the rate
+of twist psi'.  Second-order displacements and rotations are in `beam_foreshortening`.
 
-The field is linear in the modal coordinates, so that every integral of the mass matrix is
-bilinear in two shapes k and l (Shabana, Dynamics of Multibody Systems, ch. 5).  The integrals over
-the section are done here; those along the beam are left to a quadrature.
+The field is linear in the modal coordinates, so that every integral of the mass matrix is bilinear
+in two shapes k and l (Shabana, Dynamics of Multibody Systems, ch. 5).  The integrals over the
+section are evaluated here; those along the beam are left to a quadrature.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ SOURCES = ("Shabana, Dynamics of Multibody Systems, ch. 5",)
 
 
 def _shape_quantities(k: str) -> tuple[Quantity, ...]:
-    """The values of shape k at x: per unit of its modal coordinate."""
+    """Values of shape k at x, per unit of its modal coordinate."""
     return (
         Quantity(vector(f"axis_{k}", 3), "", f"displacement s, v, w of the axis by shape {k}"),
         Quantity(vector(f"turn_{k}", 3), "", "rotation of the section that carries inertia"),
@@ -48,7 +48,7 @@ SHAPE_K, SHAPE_L = _shape_quantities("k"), _shape_quantities("l")
 
 
 def column_entries(quantity: Quantity) -> Matrix:
-    """The entries of a column, one symbol each."""
+    """Entries of a column, one symbol each."""
     return Matrix([quantity.symbol[i, 0] for i in range(quantity.rows)])
 
 
@@ -65,12 +65,12 @@ def integrate_mass(matrix: Matrix) -> Matrix:
 
 
 def undeformed_position() -> Matrix:
-    """The undeformed place r0 of a point, from the root."""
+    """Undeformed position r0 of a point, from the root."""
     return Matrix([POSITION.symbol[0, 0], _Y, _Z])
 
 
 def section_displacement(axis: Matrix, turn: Matrix) -> Matrix:
-    """u at (y, z) of the section: the axis moves and the section turns about it."""
+    """u at (y, z) of the section: displacement of the axis and rotation about it."""
     return Matrix(axis) + Matrix(turn).cross(Matrix([0, _Y, _Z]))
 
 
@@ -79,7 +79,7 @@ def _shape_displacement(shape: tuple[Quantity, ...]) -> Matrix:
 
 
 def _axial_strain() -> tuple[sp.Expr, tuple[sp.Expr, ...]]:
-    """(axial strain at (y, z), the derivatives s', w'', v'' in it), from the displacement."""
+    """(axial strain at (y, z), its derivatives s', w'', v''), from the displacement."""
     s, v, w, psi = (sp.Function(name)(_X) for name in ("s", "v", "w", "psi"))
     displacement_field = section_displacement(
         Matrix([s, v, w]), Matrix([psi, -w.diff(_X), v.diff(_X)])

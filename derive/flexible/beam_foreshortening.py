@@ -1,20 +1,20 @@
 """Euler-Bernoulli beam: second-order displacements and rotations of its fields.
 
-Modal coordinates measure strain: s', psi', w'' and v'' are those of the bent and twisted rod and
-not of its linear part alone, so that the strain energy is 1/2 eta^T K eta to third order and all
-of the geometric stiffness is in the kinematics.  A section stands at r and is turned by exp(Psi~),
+Modal coordinates measure strain: s', psi', w'' and v'' are those of the bent and twisted rod, not
+only of its linear part, so that the strain energy is 1/2 eta^T K eta to third order and the whole
+geometric stiffness is in the kinematics.  A section at r is rotated by exp(Psi~),
 
     T(Psi) Psi' = theta',    r' = (1 + s') exp(Psi~) e_x,    theta = (psi, -w', v')
 
-(curvature and twist in the section's axes; the axis stays across its sections and is stretched by
-s' alone).  To second order Psi = theta + Psi2, r = r0 + (s, v, w) + u2.  Psi2 is what finite
-rotations do not commute by: bending in two planes twists, bending and twist together bend.  u2
-holds the shortening of the bent axis, and the deflection of a bent beam whose sections are
-twisted: the work of a load on it is that of its bending moments on twist times curvature, which
-buckles a narrow beam sideways.
+(curvature and twist in the section's axes; the axis stays normal to its sections and is stretched
+only by s').  To second order Psi = theta + Psi2, r = r0 + (s, v, w) + u2.  Psi2 results from the
+non-commutativity of finite rotations: bending in two planes causes twist, bending and twist
+together cause bending.  u2 contains the foreshortening of the bent axis, and the deflection of a
+bent beam whose sections are twisted: the work of a load on it is that of its bending moments on
+twist times curvature, which causes lateral buckling of a narrow beam.
 
-All arrays are the coefficients g of -1/2 eta^T g eta.  Both fields are fixed up to a rigid motion
-of second order, which is the choice of the floating frame.
+All arrays are the coefficients g of -1/2 eta^T g eta.  Both fields are determined up to a rigid
+motion of second order, which is the choice of the floating frame.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _SIZE, _ETA_K, _ETA_L = sp.symbols("size eta_k eta_l", real=True)
 
 
 def _quantity_pair(name: str, rows: int, meaning: str) -> tuple[Quantity, Quantity]:
-    """The same quantity of shapes k and l."""
+    """Same quantity for shapes k and l."""
     quantity_k, quantity_l = (
         Quantity(vector(f"{name}_{i}", rows), "", f"{meaning}, shape {i}") for i in "kl"
     )

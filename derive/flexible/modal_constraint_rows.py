@@ -1,8 +1,8 @@
-"""Rows of closed loops through a flexible body, as what hangs on its ends is seen by its modes.
+"""Rows of closed loops through a flexible body, in terms of its modes.
 
-A row has a column K of the frame and one of the modes, K_f: what it asks of their accelerations.
-A port brings H^T K, and so does the section that is held where the frame is another one.  With the
-modes eliminated, etadd = g - G a - S_ff^-1 K_f x,
+A row has a column K of the frame and one of the modes, K_f, its coefficients of their
+accelerations. A port adds H^T K, as does the supported section if the frame is another one.  With
+the modes eliminated, etadd = g - G a - S_ff^-1 K_f x,
 
     K -= G^T K_f,  L_ij += K_f,i . S_ff^-1 K_f,j,  l += K_f . g
 """
@@ -27,7 +27,7 @@ def _accumulating(quantity: Quantity) -> Quantity:
 
 
 def row_felt() -> Derivation:
-    """A column at a section, on the modes."""
+    """Modal column of a row at a section."""
     return Derivation(
         "modal",
         "row on the modes",
@@ -39,7 +39,7 @@ def row_felt() -> Derivation:
 
 
 def row_condensed() -> Derivation:
-    """Modes eliminated from a row."""
+    """A row after elimination of the modes."""
     known_part = Quantity(symbol("l", 1), "", "known part of the row", accumulate=True)
     gain = MODAL_GAIN.symbol
     return Derivation(
@@ -59,7 +59,7 @@ def row_condensed() -> Derivation:
 
 
 def row_coupled() -> Derivation:
-    """Entry of L of two rows by the modes of one body."""
+    """Contribution of the modes of one body to the entry of L of two rows."""
     entry = Quantity(symbol("L_ij", 1), "", "entry of L", accumulate=True)
     return Derivation(
         "modal",
@@ -76,7 +76,7 @@ def row_coupled() -> Derivation:
 
 
 def row_answered() -> Derivation:
-    """Modal accelerations by the multiplier of a row."""
+    """Modal accelerations due to the multiplier of a row."""
     multiplier = Quantity(symbol("x", 1), "", "multiplier of the row")
     return Derivation(
         "modal",

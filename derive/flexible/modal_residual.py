@@ -1,4 +1,4 @@
-"""Residual, momentum and energy of a flexible body in its floating frame, by moments of its fields.
+"""Residual, momentum and energy of a flexible body in its floating frame.
 
 The kinetic energy is T = 1/2 yd^T M(eta) yd with yd = [v; w; etad], frame axes, origin o:
 
@@ -165,7 +165,11 @@ W_FRAME = Quantity(vector("w", 3), "rad/s", "angular velocity of the frame, fram
 
 
 def momentum() -> Derivation:
-    """dT/d[v; w; etad] = M [v; w; etad], and T.  Under another density: what a drag would feel."""
+    """dT/d[v; w; etad] = M [v; w; etad], and T.
+
+    With the density of a viscous drag in place of the mass density, the momentum is the drag
+    load.
+    """
     frame_momentum = Quantity(vector("h", 6), "N*s, N*m*s", "momentum, moment of momentum about o")
     modal_momentum = modal_vector("h_f", "modal momentum")
     energy = Quantity(vector("T", 1), "J", "kinetic energy")
@@ -196,7 +200,7 @@ def momentum() -> Derivation:
 
 
 def strain_energy() -> Derivation:
-    """V = 1/2 eta^T K eta, and the power that damping takes, etad^T D etad."""
+    """V = 1/2 eta^T K eta, and the power etad^T D etad dissipated by damping."""
     potential = Quantity(vector("V", 1), "J", "strain energy")
     damping_power = Quantity(vector("W_d", 1), "W", "power lost in damping")
     return Derivation(

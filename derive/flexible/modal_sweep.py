@@ -1,11 +1,12 @@
-"""Steps of the Riccati sweep across a flexible body: absorb its ports, re-base, condense, recover.
+"""Steps of the Riccati sweep across a flexible body: add ports, re-base, condense, recover.
 
-Between the load f on the frame, the frame's acceleration deviation a and the modal ones etadd
+The load f on the frame, the frame's acceleration deviation a and the modal accelerations etadd
+satisfy
 
     [f; tau] = [S  S_rf; S_rf^T  S_ff] [a; etadd] + [e; e_f]
 
-A port follows with a_O = X a + H etadd and brings f_O = S_O a_O + e_O.  Where the frame is not that
-of the section that is held, a = a_I + H_I etadd (re-base).  Then the modes are eliminated.
+A port moves with a_O = X a + H etadd and adds f_O = S_O a_O + e_O.  If the frame is not that of the
+supported section, a = a_I + H_I etadd (re-base).  Then the modes are eliminated.
 """
 
 from __future__ import annotations
@@ -35,12 +36,12 @@ MODAL_GAIN = Quantity(sp.MatrixSymbol("Gg", N, 7), "", "etadd = g - G a: columns
 
 
 def _accumulating(quantity: Quantity) -> Quantity:
-    """The same array, as an output that is added to."""
+    """Same array as an output that is added to."""
     return Quantity(quantity.symbol, quantity.unit, quantity.meaning, accumulate=True)
 
 
 def absorb() -> Derivation:
-    """Modal rows of what hangs on a port (its frame rows are carried as by any weld)."""
+    """Modal rows of the bodies outboard of a port; its frame rows are carried as by a weld."""
     force, moment = WORK.symbol[:3, :], WORK.symbol[3:, :]
     lever = tilde(row_entries(SHIFT.symbol, 0))
     rotated_force = R.symbol * force
@@ -64,7 +65,7 @@ def absorb() -> Derivation:
 
 
 def rebase() -> Derivation:
-    """Modal rows and columns once the frame's acceleration is a_I + H etadd."""
+    """Modal rows and columns for the frame acceleration a_I + H etadd."""
     rebased = modal_columns("S_rf_I", 6, "S_rf + S H")
     coupling = S_RF.symbol
     return Derivation(
@@ -131,7 +132,7 @@ def recover() -> Derivation:
 
 
 def displaced() -> Derivation:
-    """Deviation of what follows the modes: a + H etadd."""
+    """Deviation of a port that follows the modes: a + H etadd."""
     return Derivation(
         "modal",
         "deviation with the modes' part",
@@ -166,7 +167,7 @@ def prescribed() -> Derivation:
 
 
 def modal_effort() -> Derivation:
-    """Efforts that the modes need: e_f + H^T e."""
+    """Required efforts on the modes: e_f + H^T e."""
     return Derivation(
         "modal",
         "efforts on the modes",
@@ -182,7 +183,7 @@ def modal_effort() -> Derivation:
 
 
 def pushed() -> Derivation:
-    """Load of a flexible body without its modes, once S is condensed: e - G^T e_f."""
+    """Load e - G^T e_f of a flexible body after elimination of its modes, with S condensed."""
     load = Quantity(vector("e_c", 6), "N, N*m", "e without modes")
     gain = MODAL_GAIN.symbol[:, :6]
     return Derivation(
@@ -196,7 +197,7 @@ def pushed() -> Derivation:
 
 
 def answer() -> Derivation:
-    """Modal accelerations that answer a load on the modes and the deviation of the frame."""
+    """Modal accelerations due to a load on the modes and the deviation of the frame."""
     response = modal_vector("y", "S_ff^-1 e_f")
     gain = MODAL_GAIN.symbol[:, :6]
     return Derivation(
@@ -217,7 +218,7 @@ def answer() -> Derivation:
 
 
 def stiffened() -> Derivation:
-    """Modal rows by accelerations with which coordinates and rates change in proportion."""
+    """Modal rows if coordinates and rates change in proportion to the accelerations."""
     rate = Quantity(vector("rate", 1), "s", "change of the rates by the accelerations")
     inverse = Quantity(vector("sq", 1), "1/s2", "accelerations by the change of the coordinates")
     return Derivation(
@@ -237,7 +238,7 @@ def stiffened() -> Derivation:
 
 
 def strained() -> Derivation:
-    """Load that the modes need for changes of their coordinates and rates."""
+    """Required modal load for changes of the modal coordinates and rates."""
     return Derivation(
         "modal",
         "load of a change of the modes",

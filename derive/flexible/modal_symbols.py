@@ -1,8 +1,8 @@
-"""Arrays of a flexible body that its kernels share; n is the number of modes, known at run time.
+"""Arrays of a flexible body shared by its kernels; n modes, known at run time.
 
 The displacement of a material point r0 is u = phi eta - 1/2 eta^T g eta (g: second order, such as
-the shortening of a bent axis, or what twist makes of its deflection).  All inertia integrals are
-moments of the fields [1, r0, phi, g] under the mass density rho:
+foreshortening by bending, or deflection by bending and twist).  All inertia integrals are moments
+of the fields [1, r0, phi, g] under the mass density rho:
 
     m, c0 = int r0, R2_ab = int r0_a r0_b            C_a = int phi_a,     E_ab = int r0_a phi_b
     F_ab = int phi_a phi_b^T,  M = sum_a F_aa        G_a = int g_a,       X_ab = int r0_a g_b
@@ -62,7 +62,7 @@ DAMPING = modal_pair("D", "damping")
 ETA = modal_vector("eta", "modal coordinates")
 ETAD = modal_vector("etad", "modal speeds")
 
-#: What the moments of one density are: data of the kernels `residual` and `momentum`.
+#: Moments of one density: data of the kernels `residual` and `momentum`.
 MOMENTS = (RIGID, C, P, B, *Z, *Y, *G, MASS)
 
 
@@ -72,12 +72,12 @@ def row_entries(array: sp.Basic, first: int, count: int = 3) -> sp.ImmutableDens
 
 
 def stack_rows(*rows: sp.Basic) -> sp.BlockMatrix:
-    """Matrices one below the other."""
+    """Stacked matrices."""
     return sp.BlockMatrix([[row] for row in rows])
 
 
 def symmetric_matrix(symmetric: sp.Basic) -> sp.ImmutableDenseMatrix:
-    """3 x 3 matrix of xx xy xz yy yz zz in a column."""
+    """Symmetric 3 x 3 matrix from a column xx xy xz yy yz zz."""
     xx, xy, xz, yy, yz, zz = (symmetric[i, 0] for i in range(6))
     return sp.ImmutableDenseMatrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 

@@ -1,14 +1,14 @@
-"""Sections of a flexible body as ports: pose, subspace and bias against the floating frame.
+"""Sections of a flexible body as ports: pose, subspace and bias relative to the frame.
 
-The rotation of a section is exp(Psi~) with Psi = theta eta - 1/2 eta^T h eta, a rotation vector, in
-pose, rates and virtual power alike.  Its angular velocity is T(Psi) Psid in the section's axes,
-T(-Psi) Psid in the frame's, T(Psi) = 1 - b Psi~ + c Psi~ Psi~.  The even functions
+The rotation of a section is exp(Psi~) with the rotation vector Psi = theta eta - 1/2 eta^T h eta,
+consistently in pose, rates and virtual power.  Its angular velocity is T(Psi) Psid in the section's
+axes, T(-Psi) Psid in the frame's, T(Psi) = 1 - b Psi~ + c Psi~ Psi~.  The even functions
 
     a = sin t / t,   b = (1 - cos t) / t^2,   c = (t - sin t) / t^3,    t^2 = s = Psi . Psi
 
-are evaluated by their series in s, which are exact to rounding up to the largest accepted
-rotation.  There is therefore no special case of small angles, and a bending plane folds to plain
-sines and cosines.
+are evaluated by their series in s, which are exact to rounding up to the largest accepted rotation.
+There is therefore no special case of small angles, and planar bending folds to plain sines and
+cosines.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from .modal_symbols import (
 
 eta, etad = ETA.symbol, ETAD.symbol
 
-#: Largest rotation of a section against its frame, rad.
+#: Largest rotation of a section relative to its frame, rad.
 MAX_SECTION_ROTATION = sp.Rational(3, 2)
 #: Terms of the series.
 SERIES_TERM_COUNT = 11
@@ -56,7 +56,7 @@ ROTATION_VECTOR_BIAS = Quantity(vector("Psidd", 3), "rad/s2", "second rate of Ps
 
 
 def section() -> Derivation:
-    """Place and rotation vector of a section, their rates, and how they follow the modes."""
+    """Position and rotation vector of a section, their rates, and their modal derivatives."""
     at_rest = [field.symbol[a, :] for field in (PHI, THETA) for a in range(3)]
     second_order = [g.symbol for g in (*SECOND_DISPLACEMENTS, *SECOND_ROTATIONS)]
     rows = [row - eta.T * g for row, g in zip(at_rest, second_order, strict=True)]
@@ -196,7 +196,7 @@ def _velocity_equations(subspace: sp.Basic) -> tuple[Equation, ...]:
 
 
 def outward() -> Derivation:
-    """From the floating frame (inboard) to an end (outboard): as the kernel of a hinge."""
+    """Motion from the floating frame (inboard) to an end (outboard), as a hinge kernel."""
     rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
     zero_block = sp.zeros(3, 3)
     subspace = sp.BlockMatrix(
@@ -218,9 +218,10 @@ def outward() -> Derivation:
 
 
 def inward() -> Derivation:
-    """From the end that is held (inboard) to the floating frame (outboard), the inverse motion.
+    """Motion from the supported end (inboard) to the floating frame (outboard).
 
-    w = -W with W = T(-Psi) Psid the spin of the section in frame axes, v = W x x - xd.
+    The inverse of `outward`: w = -W with W = T(-Psi) Psid the spin of the section in frame
+    axes, v = W x x - xd.
     """
     rotation, end_rotation = _OUTPUTS[0].symbol, END_ROTATION.symbol
     lever = tilde(row_entries(POSITION.symbol, 0))
@@ -254,7 +255,7 @@ def inward() -> Derivation:
 
 
 def turn_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
-    """The rotation of a section must stay within the range of the series and of the model."""
+    """Guards of the section rotation: range of the series and of the model."""
     text = f"a section turns by more than {MAX_SECTION_ROTATION} rad against its floating frame"
     return ((SQUARE[0, 0] < MAX_SECTION_ROTATION**2, 1, text),)
 
@@ -273,7 +274,7 @@ def subspace() -> Derivation:
 
 
 def imposed() -> Derivation:
-    """Bias of a port when the modal accelerations are prescribed: c + H s."""
+    """Bias of a port with prescribed modal accelerations s: c + H s."""
     h = modal_columns("H", 6, "motion subspace of the modes")
     s = modal_vector("s", "prescribed modal accelerations")
     total = Quantity(vector("c_s", 6), "", "relative acceleration")

@@ -50,7 +50,7 @@ def refuse_jumps(
         for node, switch_function in branch_switches:
             for symbol in sorted(switch_function.free_symbols & along.keys(), key=str):
                 for location in _branch_points(switch_function, symbol, along[symbol], point):
-                    _refuse_jump(where, expressions, node, {**point, symbol: location}, symbol, why)
+                    _reject_jump(where, expressions, node, {**point, symbol: location}, symbol, why)
 
 
 def _branch_points(
@@ -65,18 +65,19 @@ def _branch_points(
     return list(crossings(mpmath.linspace(*bounds, _SAMPLE_COUNT), value, _DIGITS))
 
 
-def _refuse_jump(
+def _reject_jump(
     where: str,
     expressions: Mapping[str, sp.Matrix],
     node: sp.Basic,
-    place: Mapping[sp.Symbol, mpmath.mpf],
+    point_of_jump: Mapping[sp.Symbol, mpmath.mpf],
     symbol: sp.Symbol,
     why: str,
 ) -> None:
     for label, matrix in expressions.items():
         with mpmath.workdps(_DIGITS):
             sides = [
-                {**place, symbol: place[symbol] + d} for d in (-_BRANCH_DISTANCE, _BRANCH_DISTANCE)
+                {**point_of_jump, symbol: point_of_jump[symbol] + d}
+                for d in (-_BRANCH_DISTANCE, _BRANCH_DISTANCE)
             ]
             try:
                 values_before, values_after = (_matrix_entries(matrix, side) for side in sides)
@@ -90,7 +91,7 @@ def _refuse_jump(
                 continue
         raise ElementError(
             f"{where}: {label} jumps at {_expression_text(symbol)} = "
-            f"{_number_text(place[symbol])}, where "
+            f"{_number_text(point_of_jump[symbol])}, where "
             f"{_expression_text(node):.80} switches branches: {why}"
         )
 

@@ -1,4 +1,4 @@
-"""Checks of a definition before anything is generated from it; each refusal names the equation.
+"""Checks of a definition before generation; each rejection names the equation.
 
 Numbers are drawn from a fixed sequence within the declared bounds and evaluated at 40 digits.
 """
@@ -44,7 +44,7 @@ def check_element(element: Element) -> None:
 
 
 def _check_methods(where: str, element: Element) -> None:
-    """Reject a method whose name nearly matches one of the base class: it would never be called."""
+    """Reject a method that resembles a base class method, because it would never be called."""
     base = next(kind for kind in (Hinge, Body, ForceElement) if isinstance(element, kind))
     method_names = [name for name in dir(base) if not name.startswith("_")]
     for name, value in vars(type(element)).items():
@@ -238,7 +238,7 @@ def _check_symbols(where: str, motion: HingeMotion) -> None:
         ("position(q, p)", motion.position, symbols),
         ("rates(q, u, p)", motion.rates, symbols | {*motion.u}),
     ):
-        _refuse_unknown_symbols(where, label, matrix, names)
+        _reject_unknown_symbols(where, label, matrix, names)
     for speed in motion.u:
         if motion.rates.diff(speed).free_symbols & set(motion.u):
             raise ElementError(f"{where}: rates(q, u, p) must be linear in u: qdot = N(q) u")
@@ -246,12 +246,14 @@ def _check_symbols(where: str, motion: HingeMotion) -> None:
         raise ElementError(f"{where}: rates(q, u, p) must vanish with u: qdot = N(q) u")
 
 
-def _refuse_unknown_symbols(where: str, what: str, matrix: sp.Basic, known: set[sp.Symbol]) -> None:
-    unknown_symbols = sorted(map(str, matrix.free_symbols - known))
+def _reject_unknown_symbols(
+    where: str, label: str, matrix: sp.Basic, allowed: set[sp.Symbol]
+) -> None:
+    unknown_symbols = sorted(map(str, matrix.free_symbols - allowed))
     if unknown_symbols:
-        arguments = what[what.find("(") + 1 : -1] if what.endswith(")") else "its arguments"
+        arguments = label[label.find("(") + 1 : -1] if label.endswith(")") else "its arguments"
         raise ElementError(
-            f"{where}: {what} contains {', '.join(unknown_symbols)}; expected only {arguments}"
+            f"{where}: {label} contains {', '.join(unknown_symbols)}; expected only {arguments}"
         )
 
 
@@ -285,25 +287,25 @@ def _check_rank(where: str, motion: HingeMotion, point: Numbers) -> None:
 
 
 def _check_agreement(
-    where: str, what: str, given: sp.Matrix | None, derived: sp.Matrix, point: Numbers
+    where: str, label: str, stated_matrix: sp.Matrix | None, derived: sp.Matrix, point: Numbers
 ) -> None:
-    if given is None:
+    if stated_matrix is None:
         return
-    if given.shape != derived.shape:
+    if stated_matrix.shape != derived.shape:
         raise ElementError(
-            f"{where}: {what} is {given.rows} x {given.cols}, "
+            f"{where}: {label} is {stated_matrix.rows} x {stated_matrix.cols}, "
             f"expected {derived.rows} x {derived.cols}"
         )
     with mpmath.workdps(_DIGITS):
-        difference = _numeric_matrix(f"{where}: {what}", given, point) - _numeric_matrix(
+        difference = _numeric_matrix(f"{where}: {label}", stated_matrix, point) - _numeric_matrix(
             where, derived, point
         )
         for i in range(difference.rows):
             for j in range(difference.cols):
                 if abs(difference[i, j]) > _TOLERANCE:
                     raise ElementError(
-                        f"{where}: {what} disagrees with rotation and position in entry "
-                        f"({i + 1}, {j + 1}): stated {given[i, j]}, derived {derived[i, j]}"
+                        f"{where}: {label} disagrees with rotation and position in entry "
+                        f"({i + 1}, {j + 1}): stated {stated_matrix[i, j]}, derived {derived[i, j]}"
                     )
 
 
@@ -325,14 +327,14 @@ def _dimensions(symbols: Symbols, declared: tuple[Param, ...]) -> dict[sp.Basic,
 
 
 def _check_dimension(
-    where: str, what: str, matrix: sp.Matrix, unit: str, known: dict[sp.Basic, Dimension]
+    where: str, label: str, matrix: sp.Matrix, unit: str, dimensions: dict[sp.Basic, Dimension]
 ) -> None:
     expected_dimension = dimension(unit)
     for i in range(matrix.rows):
         for j in range(matrix.cols):
-            entry = f"entry ({i + 1}, {j + 1}) of {what}" if matrix.shape != (1, 1) else what
+            entry = f"entry ({i + 1}, {j + 1}) of {label}" if matrix.shape != (1, 1) else label
             try:
-                found_dimension = dimension_of(matrix[i, j], known)
+                found_dimension = dimension_of(matrix[i, j], dimensions)
             except UnitMismatch as misfit:
                 raise ElementError(f"{where}: {entry}: units do not fit: {misfit}") from None
             if found_dimension is not None and found_dimension != expected_dimension:
@@ -354,12 +356,12 @@ def check_body(body: Body) -> None:
     )
     forces, energies = "residual(a, alpha, w, p)", "kinetic_energy(v, w, p)"
     residual = stated.matrix(location, forces, body.residual, (6, 1), a, alpha, w, p)
-    _refuse_unknown_symbols(location, forces, residual, {*a, *alpha, *w, *p})
+    _reject_unknown_symbols(location, forces, residual, {*a, *alpha, *w, *p})
     mass = _jacobian(residual, sp.Matrix.vstack(a, alpha))
     if mass.applyfunc(sp.expand).free_symbols & {*a, *alpha}:
         raise ElementError(f"{location}: {forces} is not linear in a and alpha")
     energy = stated.scalar(location, energies, body.kinetic_energy, v, w, p)
-    _refuse_unknown_symbols(location, energies, energy, {*v, *w, *p})
+    _reject_unknown_symbols(location, energies, energy, {*v, *w, *p})
     speeds = sp.Matrix.vstack(v, w)
     from_energy = _jacobian(_jacobian(sp.Matrix([energy]), speeds).T, speeds)
     rate = _energy_rate(residual, energy, (a, alpha, v, w))
@@ -381,10 +383,10 @@ def _jacobian(matrix: sp.Matrix, symbols: sp.Matrix) -> sp.Matrix:
     return sp.Matrix.hstack(*(sp.Matrix(slope(matrix, s)) for s in symbols))
 
 
-def _are_equal(one: mpmath.matrix, two: mpmath.matrix) -> bool:
+def _are_equal(a: mpmath.matrix, b: mpmath.matrix) -> bool:
     with mpmath.workdps(_DIGITS):
-        size = 1 + max(abs(x) for x in (*one, *two))
-        return all(abs(x - y) <= _TOLERANCE * size for x, y in zip(one, two, strict=True))
+        size = 1 + max(abs(x) for x in (*a, *b))
+        return all(abs(x - y) <= _TOLERANCE * size for x, y in zip(a, b, strict=True))
 
 
 def _energy_rate(residual: sp.Matrix, energy: sp.Expr, names: tuple[sp.Matrix, ...]) -> sp.Matrix:
@@ -399,14 +401,14 @@ def _energy_rate(residual: sp.Matrix, energy: sp.Expr, names: tuple[sp.Matrix, .
 def _check_body_units(
     where: str,
     body: Body,
-    said: tuple[sp.Matrix, sp.Expr],
+    methods: tuple[sp.Matrix, sp.Expr],
     p: Symbols,
     names: tuple[sp.Matrix, ...],
 ) -> None:
     dimensions = _dimensions(p, body.parameters)
     for symbols, unit in zip(names, ("m/s2", "rad/s2", "rad/s", "m/s"), strict=True):
         dimensions |= {s: dimension(unit) for s in symbols}
-    residual, energy = said
+    residual, energy = methods
     _check_dimension(where, "the force of residual", sp.expand(residual[:3, :]), "N", dimensions)
     _check_dimension(where, "the moment of residual", sp.expand(residual[3:, :]), "N*m", dimensions)
     _check_dimension(where, "kinetic_energy", sp.Matrix([energy]), "J", dimensions)
@@ -426,7 +428,7 @@ def check_force(force: ForceElement) -> None:
     for symbols, unit in ((x, "m"), (v, "m/s"), (w, "rad/s"), (rotation, "")):
         dimensions |= {s: dimension(unit) for s in symbols}
     dimensions |= {effort: dimension("N"), t: dimension("s")}
-    _refuse_unknown_symbols(location, label, sp.Matrix.vstack(push, turn), set(dimensions))
+    _reject_unknown_symbols(location, label, sp.Matrix.vstack(push, turn), set(dimensions))
     numbers, angle = random.Random(20262), sp.Symbol("angle", real=True)
     points = [{s: numbers.uniform(-1, 1) for s in (*x, angle)} for _ in range(2)]
     for point in points:
@@ -449,24 +451,24 @@ def check_force(force: ForceElement) -> None:
 def _potential(
     where: str, force: ForceElement, x: sp.Matrix, rotation: sp.Matrix, p: Symbols
 ) -> sp.Expr:
-    """The potential as a function of x and, where a deflection is stated, of the rotation."""
+    """Potential as a function of x and, if a deflection is stated, of the rotation."""
     label = "deflection(x, rotation, p)"
     deflection = stated.optional(where, label, force.deflection, x, rotation, p)
     if deflection is None:
         energy = stated.scalar(where, "potential(x, p)", force.potential, x, p)
-        _refuse_unknown_symbols(where, "potential(x, p)", energy, {*x, *p})
+        _reject_unknown_symbols(where, "potential(x, p)", energy, {*x, *p})
         return energy
     if deflection.cols != 1:
         raise ElementError(
             f"{where}: {label} must be n x 1, found {deflection.rows} x {deflection.cols}"
         )
     energy = stated.scalar(where, "potential(deflection, p)", force.potential, deflection, p)
-    _refuse_unknown_symbols(where, "potential(deflection, p)", energy, {*x, *rotation, *p})
+    _reject_unknown_symbols(where, "potential(deflection, p)", energy, {*x, *rotation, *p})
     return energy
 
 
 def _rotation_entries(rotation: sp.Matrix, angle: sp.Symbol) -> dict[sp.Symbol, sp.Expr]:
-    """Entries of a rotation by `angle` about an axis that is no coordinate axis."""
+    """Entries of a rotation by `angle` about an axis other than a coordinate axis."""
     axis = (sp.Rational(3, 13), sp.Rational(4, 13), sp.Rational(12, 13))
     return dict(zip(rotation, rotation_about(axis, angle), strict=True))
 

@@ -40,7 +40,7 @@ def _largest_deviation(kernel: KernelIR, base: KernelIR, source: InputSampler) -
             forward, backward = (
                 _evaluate_shifted(base, inputs, side * _STEP, n) for side in (1, -1)
             )
-            inputs |= evaluate(base, inputs, _DIGITS, n)  # outputs that are read again
+            inputs |= evaluate(base, inputs, _DIGITS, n)  # outputs that later calls read
         except GuardFailure:
             continue
         derivatives = evaluate(kernel, inputs, _DIGITS, n)

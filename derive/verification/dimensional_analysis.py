@@ -22,7 +22,7 @@ _FACTOR_PATTERN = re.compile(r"([A-Za-z]+|1)\s*(?:\^|\*\*)?\s*(-?\d+)?")
 
 
 def dimension(unit: str) -> Dimension:
-    """Dimension of a unit such as "N*m/rad", "kg*m2", "m/s^2".  ElementError for unknown ones."""
+    """Dimension of a unit such as "N*m/rad", "kg*m2", "m/s^2".  Raises ElementError."""
     total = list(_PURE_NUMBER)
     above = True
     for part in re.split(r"([*/ ])", unit.replace("·", "*").strip()):
@@ -56,7 +56,7 @@ class UnitMismatch(Exception):
 
 
 def dimension_of(expression: sp.Expr, known: Mapping[sp.Basic, Dimension]) -> Dimension | None:
-    """Dimension of an expression; None for zero, which has any dimension.  Raises Misfit."""
+    """Dimension of an expression; None for zero.  Raises UnitMismatch."""
     if expression == 0:
         return None
     if expression.is_number:

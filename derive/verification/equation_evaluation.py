@@ -25,7 +25,7 @@ Number = Any
 
 
 class Undefined(ArithmeticError):
-    """An equation has no finite real value at the point: a pole, a singular system, a domain."""
+    """An equation has no finite real value: a pole, a singular system, or outside its domain."""
 
 
 class GuardBroken(Undefined):
@@ -38,7 +38,7 @@ class GuardBroken(Undefined):
 
 @dataclass(frozen=True)
 class DirectValue:
-    """Outputs as they are stored, and the largest entry of S - S^T of the symmetric ones."""
+    """Stored outputs, and the largest entry of S - S^T of the symmetric ones."""
 
     outputs: dict[str, list[Number]]
     asymmetry: Number
@@ -131,7 +131,7 @@ def _asymmetry(value: Matrix) -> Number:
 
 @dataclass
 class _Empty:
-    """A matrix without entries, which mpmath does not have."""
+    """A matrix without entries, which mpmath does not support."""
 
     rows: int
     cols: int
@@ -206,7 +206,7 @@ class _Values:
 
     def _product(self, e: sp.MatMul, height: int, width: int) -> Matrix:
         if any(0 in (int(a.shape[0]), int(a.shape[1])) for a in e.args if a.is_Matrix):
-            return mpmath.zeros(height, width)  # a sum over nothing
+            return mpmath.zeros(height, width)  # empty sum
         factors = [self.matrix(a) if a.is_Matrix else self.scalar(a) for a in e.args]
         return _fold(lambda a, b: a * b, factors)
 

@@ -1,7 +1,7 @@
-"""Evaluate a KernelIR at any precision (mpmath); with plain floats `mstmm.ir.interpreter` does it.
+"""Evaluation of a KernelIR at any precision (mpmath); `mstmm.ir.interpreter` uses floats.
 
-Both walk the same statements in the same order; only the arithmetic differs.  Operations outside
-their real domain give NaN or an infinity as IEEE arithmetic has it, never an exception.
+Both execute the same statements in the same order; only the arithmetic differs.  Operations outside
+their real domain give NaN or infinity as in IEEE arithmetic, never an exception.
 """
 
 from __future__ import annotations

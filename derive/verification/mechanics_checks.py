@@ -1,8 +1,7 @@
 """Checks of kernels against the laws of mechanics, independent of their derivation.
 
-Velocities and accelerations by differences along a motion at 60 digits, forces by energies, balance
-of forces and moments, no work on closed paths.  Kernels are called by name through `Call`; the
-checks do not use their derivation.
+Velocities and accelerations from differences along a motion at 60 digits, forces from energies,
+balance of forces and moments, no work on closed paths.  Kernels are called by name through `Call`.
 """
 
 from __future__ import annotations
@@ -24,15 +23,15 @@ Number = Any
 End = tuple[Matrix, Matrix, Matrix, Matrix]  # axes, position, velocity, angular velocity
 
 DIGITS = 60
-#: Step of the differences: they err by its square, and by 1e-60 over its square.
+#: Step of the differences; their error is its square, plus 1e-60 over its square.
 STEP = mpmath.mpf(10) ** -15
-#: Largest error of the differences, with a wide margin.
+#: Limit for errors of differences, with a wide margin.
 MAX_DIFFERENCE_ERROR = 1e-22
-#: Largest error of algebra at 60 digits.
+#: Limit for algebraic errors at 60 digits.
 MAX_ALGEBRA_ERROR = 1e-40
 #: Accelerations of a body of unit size above which its hinge's coordinates count as singular.
 MAX_ACCELERATION = 1e9
-#: Time before and after a point where branches meet, and how far values may differ over it.
+#: Time before and after a point where branches meet, and the limit of a change across it.
 BRANCH_DISTANCE = mpmath.mpf(10) ** -12
 MAX_JUMP = 1e-6
 
@@ -184,22 +183,24 @@ def hinge_properties(
             try:
                 point_errors = seen(q)
                 if not point_errors.passed:
-                    point_errors = _check_beside_branch(_Hinge(call, p, q, u, [0] * nu), seen)
+                    point_errors = _check_near_branch(_Hinge(call, p, q, u, [0] * nu), seen)
                 errors.include(point_errors)
             except ArithmeticError:  # a singular configuration of the coordinates
                 continue
     return errors.properties()
 
 
-def _check_beside_branch(hinge: _Hinge, seen: Callable[[list[Any]], WorstErrors]) -> WorstErrors:
+def _check_near_branch(
+    hinge: _Hinge, evaluate_errors: Callable[[list[Any]], WorstErrors]
+) -> WorstErrors:
     """Evaluate the properties on both sides of a point where branches may meet.
 
     Differences across the point are wrong.  Continuous quantities are compared at the point;
     the bias may jump, and then lies between both sides.
     """
     previous, following = hinge.coordinates(-BRANCH_DISTANCE), hinge.coordinates(BRANCH_DISTANCE)
-    errors = seen(previous)
-    errors.include(seen(following))
+    errors = evaluate_errors(previous)
+    errors.include(evaluate_errors(following))
     outputs, *sides = (hinge.kernel(q, hinge.u) for q in (hinge.q, previous, following))
     for side in sides:
         computed = [x for name in ("R", "d", "v", "w") for x in outputs[name]]
@@ -422,7 +423,7 @@ def _check_body_power(call: Call, p: list[Any], numbers: random.Random, worst: W
 
 
 def force_properties(call: Call, source: InputSampler, count: int) -> tuple[Property, ...]:
-    """Power that a force element gives to its two ends = its lost power - dV/dt."""
+    """Power of a force element on its two ends = its dissipated power - dV/dt."""
     errors, numbers = WorstErrors(), random.Random(17)
     with mp.workdps(DIGITS):
         for _ in range(4):

@@ -1,4 +1,4 @@
-"""The operations of `ir.OPERATIONS` on mpmath numbers, with the values IEEE 754 has for doubles."""
+"""Operations of `ir.OPERATIONS` on mpmath numbers, with the special values of IEEE 754."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Function = Callable[..., Any]
 
 @lru_cache(maxsize=16)
 def _make_context(digits: int) -> Any:
-    """mpmath context with its own precision, so that no global precision changes."""
+    """mpmath context with its own precision, leaving the global precision unchanged."""
     context = mpmath.MPContext()
     context.dps = digits
     return context

@@ -1,4 +1,4 @@
-"""Sample points at which kernels are compared: random ones and critical ones.
+"""Sample points for comparing kernels: random and critical ones.
 
 All values are doubles, so that exact and rounded evaluation start from the same numbers.  Pairs
 of cosine and sine have sixty digits, since doubles would violate c^2 + s^2 = 1.
@@ -19,7 +19,7 @@ from mstmm.ir.element_spec import Param
 
 Numbers = list[float]
 
-#: Places of a quaternion's entries by the name of its coordinate: w, x, y, z or qw, qx, qy, qz.
+#: Index of a quaternion's entry by the name of its coordinate: w, x, y, z or qw, qx, qy, qz.
 _QUATERNION_LETTERS = "wxyz"
 _SQRT_HALF = math.sqrt(0.5)
 
@@ -303,7 +303,7 @@ def random_rotation(numbers: random.Random) -> Numbers:
 
 
 def _definite_matrix(n: int, numbers: random.Random) -> Numbers:
-    """A symmetric matrix with eigenvalues of 1 and more, row by row."""
+    """Symmetric matrix with eigenvalues of at least 1, row by row."""
     upper = iter(_definite_triangle(n, numbers))
     rows = [[0.0] * n for _ in range(n)]
     for i in range(n):
@@ -313,7 +313,7 @@ def _definite_matrix(n: int, numbers: random.Random) -> Numbers:
 
 
 def _definite_triangle(n: int, numbers: random.Random) -> Numbers:
-    """Upper triangle of a symmetric matrix with eigenvalues of 1 and more."""
+    """Upper triangle of a symmetric matrix with eigenvalues of at least 1."""
     half = [_uniform_values(n, numbers) for _ in range(n)]
     return [
         math.fsum(a * b for a, b in zip(half[i], half[j], strict=True)) + (i == j)

@@ -1,8 +1,8 @@
 """Discrete-time transfer matrices of rigid and flexible bodies, planar and spatial.
 
-One residual (`flexible_energy`) and one linear time map yd = C y + D, ydd = A y + B, expanded once
-at a predictor: Z = A M + C dR/dyd + dR/dy.  The frame's rows give the loads at the output end,
-geometry gives its place, and the modal coordinates are the same at both ends: z_O = U z_I.  The
+One residual (`equations_of_motion`) and one linear time map yd = C y + D, ydd = A y + B, expanded
+once at a predictor: Z = A M + C dR/dyd + dR/dy.  The frame's rows give the loads at the output end,
+geometry gives its position, and the modal coordinates are the same at both ends: z_O = U z_I.  The
 modal rows are no part of U.  In terms of z_I they are W z_I = 0, which the hinge before the body
 needs.
 """
@@ -68,9 +68,9 @@ _NOTES = (
 
 
 def _motion_symbols(space: Space, modes: int, letters: SymbolTable) -> Motion:
-    def three(name: str, size: int, before: int) -> sp.Matrix:
+    def three(name: str, size: int, offset: int) -> sp.Matrix:
         return sp.Matrix(
-            [*[0] * before, *letters.of(vector(name, size)), *[0] * (3 - before - size)]
+            [*[0] * offset, *letters.of(vector(name, size)), *[0] * (3 - offset - size)]
         )
 
     def modal(name: str) -> sp.Matrix:
@@ -134,7 +134,7 @@ def _frame_axes(space: Space) -> sp.Basic:
 def _linearised_equations(
     space: Space, modes: int, solved: Equations, letters: SymbolTable
 ) -> tuple[Equation, ...]:
-    """Residual at the predictor and Z = A M + C dR/dyd + dR/dy, turned to inertial axes."""
+    """Residual at the predictor and Z = A M + C dR/dyd + dR/dy, in inertial axes."""
     size = space.rigid + modes
     mass, rates, shape = (sp.MatrixSymbol(name, size, size) for name in ("M", "N_b", "L_b"))
     rows, impedance = vector("F_b", size), sp.MatrixSymbol("Z", size, size)
@@ -170,7 +170,7 @@ def _linearised_equations(
 def _coordinate_derivative(
     space: Space, modes: int, solved: Equations, letters: SymbolTable
 ) -> Matrix:
-    """Columns of r (none), of the frame's turn, and of eta."""
+    """Derivative columns of r (zero), of the frame's rotation, and of eta."""
     size, shifts, turns = space.rigid + modes, space.shifts, space.turns
     a, mass, rows = vector("a", shifts), sp.MatrixSymbol("M", size, size), vector("F_b", size)
     by_a = Matrix(size, shifts, lambda i, j: mass[i, j])

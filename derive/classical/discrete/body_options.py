@@ -10,7 +10,7 @@ from ...definition.derivation import Quantity, vector
 from .mass_moments import ETA
 from .state import Space
 
-#: Numbers of the linear time map, and the tangent operator of a rotation update.
+#: Coefficients of the linear time map, and the tangent operator of a rotation update.
 MAP_A, MAP_C = sp.MatrixSymbol("A", 1, 1), sp.MatrixSymbol("C", 1, 1)
 A, C = MAP_A[0, 0], MAP_C[0, 0]
 TANGENT_OPERATOR = sp.MatrixSymbol("T", 3, 3)
@@ -18,7 +18,7 @@ TANGENT_OPERATOR = sp.MatrixSymbol("T", 3, 3)
 
 @dataclass(frozen=True)
 class BodyStatement:
-    """Which body: rigid (no modes), beam or elastic; `planes` are the directions of its modes."""
+    """Kind of body: rigid (no modes), beam or elastic; `planes` are directions of its modes."""
 
     element: str
     title: str

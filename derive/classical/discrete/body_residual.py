@@ -1,7 +1,7 @@
 """Nonlinear premises of rigid and flexible bodies, for pages and for checks.
 
-The balances are written in vectors, as Newton and Euler would; the matrices are derived from the
-energy (`flexible_energy`), so that their agreement is an independent check.
+The balances are written in vectors, as by Newton and Euler; the matrices are derived from the
+energy (`equations_of_motion`), so that their agreement is an independent check.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _MASS = sp.MatrixSymbol("m", 1, 1)[0, 0]
 
 
 def planar_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equation, ...]:
-    """A body in the plane: (8.66) to (8.68) for a beam."""
+    """Premises of a planar body; (8.66) to (8.68) for a beam."""
     modes = statement.modes
     r_i, q_i, m_i = vector("r_I", 2), vector("q_I", 2), vector("m_I", 1)
     r_o, q_o, m_o = vector("r_O", 2), vector("q_O", 2), vector("m_O", 1)
@@ -80,7 +80,7 @@ def planar_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equati
 
 
 def spatial_premises(statement: BodyStatement, body: BodyMoments) -> tuple[Equation, ...]:
-    """A body in space, to first order in psi: (8.152) to (8.164) for a beam."""
+    """Premises of a spatial body, to first order in psi; (8.152) to (8.164) for a beam."""
     modes = statement.modes
     r_i, q_i, m_i = (vector(f"{name}_I", 3) for name in "rqm")
     r_o, q_o, m_o = vector("r_O", 3), vector("q_O", 3), vector("m_O", 3)
@@ -177,8 +177,8 @@ _EQUATION_NUMBERS = {
 }
 
 
-def _equation_number(statement: BodyStatement, place: int) -> str:
-    return _EQUATION_NUMBERS.get((statement.space.name, statement.kind), ("", "", ""))[place]
+def _equation_number(statement: BodyStatement, position: int) -> str:
+    return _EQUATION_NUMBERS.get((statement.space.name, statement.kind), ("", "", ""))[position]
 
 
 def _modal_symbols(modes: int) -> tuple[sp.MatrixSymbol, sp.MatrixSymbol, sp.MatrixSymbol]:
@@ -227,7 +227,7 @@ def _time_map_equations(name: str, size: int, angle: bool = False) -> tuple[Equa
 
 
 def _moment_definitions(body: BodyMoments, modes: int) -> tuple[Equation, ...]:
-    """The moments of the deformed body, at the coordinates of the input end."""
+    """Moments of the deformed body, at the coordinates of the input end."""
     if not modes:
         return body.definitions
     predicted, current = vector(ETA, modes).as_explicit(), vector("eta_I", modes).as_explicit()
@@ -256,7 +256,7 @@ def _moment_rates(
 
 
 def _beam_shape_equations(statement: BodyStatement) -> tuple[Equation, ...]:
-    """What a planar beam's deflections are as plane vectors."""
+    """Deflections of a planar beam as plane vectors."""
     if statement.kind != "beam":
         return ()
     modes = statement.modes
@@ -285,7 +285,7 @@ def _planar_end(statement: BodyStatement) -> sp.Basic:
 
 
 def _skew_matrix(name: str, size: int) -> Matrix:
-    """A skew matrix of which the part above the diagonal is read."""
+    """Skew matrix given by the part above its diagonal."""
     entries = sp.MatrixSymbol(name, size, size)
     return Matrix(
         size, size,

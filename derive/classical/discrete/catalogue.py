@@ -1,8 +1,8 @@
-"""Which discrete-time classical matrices are generated, each with the equation it answers to.
+"""Catalogue of the generated discrete-time classical matrices and their source equations.
 
 The number of modes is a parameter of every derivation; generated are three, two and one for the
 planar beam (three as printed: 10 x 10), one per bending plane for the spatial one (15 x 15), and as
-many for the hinges beside them.
+many for the adjacent hinges.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .body_options import BodyStatement
 from .hinge import named_pairing
 from .state import PLANE, SPACE
 
-#: Modes of the beams beside the generated hinges.
+#: Modes of the beams adjacent to the generated hinges.
 PLANAR_MODES, SPATIAL_MODES = 3, 2
 
 _BENDING = (
@@ -140,7 +140,7 @@ def _hinge_derivation(name: str, which: str) -> Derivation:
     return make_derivation(pair, f"{name}_{which}", *numbers[which])
 
 
-#: Name -> derivation, made once.
+#: Name -> derivation, cached.
 DISCRETE_DERIVATIONS: dict[str, Callable[[], Derivation]] = {
     **{body.element: cache(partial(flexible_body.derivation, body)) for body in BODIES},
     **{
@@ -150,8 +150,8 @@ DISCRETE_DERIVATIONS: dict[str, Callable[[], Derivation]] = {
     },
 }
 
-#: Those of which the discrete-time method makes its steps: rigid bodies and beams with the largest
-#: number of modes (a beam with fewer leaves some idle), and every hinge.
+#: Elements of the discrete-time method: rigid bodies and beams with the largest number of modes (a
+#: beam with fewer modes leaves some unused), and every hinge.
 STEPPING_ELEMENTS = (
     "body_planar_discrete", "beam_planar_discrete", "body_spatial_discrete",
     "beam_spatial_discrete",

@@ -10,8 +10,8 @@ Lagrange's equations in the quasi-velocities v, w (Boltzmann, Hamel) are, with p
 
     dp/dt + w x p = force,   dh/dt + w x h + v x p = moment about o,   d/dt dT/detad - dT/deta = ...
 
-c, J and G depend on eta.  They stay symbols here, of which only the derivatives by eta are known,
-so that equations and tangents stay as short as the body's motion lets them be.
+c, J and G depend on eta.  They stay symbols here, with known derivatives by eta, to keep equations
+and tangents short.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Moments:
 
 @dataclass(frozen=True)
 class Motion:
-    """Symbols of the motion in frame axes.  Vectors have three entries; in the plane some are 0."""
+    """Symbols of the motion in frame axes: three entries per vector, some zero in the plane."""
 
     a: Vector
     w: Vector
@@ -70,7 +70,7 @@ class Equations:
 
 
 def equations_of_motion(moments: Moments, motion: Motion, elastic: Vector) -> Equations:
-    """The rows of inertia plus `elastic` (n x 1: the forces of strain and damping).
+    """Rows of inertia plus `elastic` (n x 1: the forces of strain and damping).
 
     Raises ValueError if the velocity of the origin itself does not drop out.
     """
@@ -101,7 +101,7 @@ def equations_of_motion(moments: Moments, motion: Motion, elastic: Vector) -> Eq
 
 
 def kinetic_energy(moments: Moments, v: Vector, motion: Motion) -> sp.Expr:
-    """T of the frame's velocity v, w and the modal rates."""
+    """T for the frame's velocity v, w and the modal rates."""
     w, etad = motion.w, motion.etad
     relative_velocity = w.cross(moments.first) + moments.shift * etad
     total = moments.mass * v.dot(v) / 2 + v.dot(relative_velocity) + w.dot(moments.second * w) / 2
@@ -138,6 +138,6 @@ def _gradient(energy: sp.Expr, symbols: Vector) -> Vector:
 
 
 def _existing_entries(values: Vector, pattern: Vector | None = None) -> list[sp.Expr]:
-    """Entries along directions that exist."""
+    """Entries along non-zero directions."""
     pattern = values if pattern is None else pattern
     return [value for value, s in zip(values, pattern, strict=True) if s != 0]

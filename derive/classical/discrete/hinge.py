@@ -1,14 +1,14 @@
-"""Elimination that gives the discrete-time matrices of hinges next to flexible bodies.
+"""Discrete-time matrices of hinges next to flexible bodies, by elimination.
 
-Outboard of a hinge the state is z_O = E z_I + G x, where x holds what the hinge leaves free: its
+Outboard of a hinge the state is z_O = E z_I + G x, where x contains the free unknowns: the hinge's
 own free directions and the modal coordinates of the outboard beam.  They follow from V z_O = 0: the
 modal rows W of the outboard body and, for a smooth hinge, the next hinge's condition L on the load
 at the far end of that body, L U z_O = 0.  So
 
     U_h = E - G (V G)^-1 V E.
 
-Rigid or flexible inboard is a matter of the columns of E (section rotation of the inboard end),
-rigid or flexible outboard one of the rows of V.
+A flexible inboard body only changes the columns of E (section rotation of the inboard end), a
+flexible outboard body the rows of V.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from ...definition.notation import Matrix, solve_linear
 from ..state_vector import StateVector, append_affine_row
 from .state import BOOK, Space
 
-#: Which bodies a hinge joins, inboard first.
+#: Bodies connected by a hinge, inboard first.
 PAIRINGS = ("rigid_rigid", "rigid_beam", "beam_beam", "beam_rigid")
 
 
 @dataclass(frozen=True)
 class Pairing:
-    """A hinge between two bodies with so many modes each; 0 means rigid."""
+    """A hinge between two bodies with these numbers of modes; 0 means rigid."""
 
     space: Space
     inboard: int
@@ -46,11 +46,11 @@ class Pairing:
         return self.space.state(self.outboard)
 
     def at_input(self, name: str) -> sp.MatrixSymbol:
-        """A block of the state at the input end."""
+        """Block of the state at the input end."""
         return _block(self.state_in, name, "I")
 
     def at_output(self, name: str) -> sp.MatrixSymbol:
-        """A block of the state at the output end."""
+        """Block of the state at the output end."""
         return _block(self.state_out, name, "O")
 
     @property
@@ -61,7 +61,7 @@ class Pairing:
 
 
 def named_pairing(space: Space, name: str, modes: int) -> Pairing:
-    """The pairing called `name`; every beam has `modes` modes."""
+    """Pairing with this name; every beam has `modes` modes."""
     inboard, outboard = (modes * int(side == "beam") for side in name.split("_"))
     return Pairing(space, inboard, outboard)
 
@@ -122,7 +122,7 @@ _STATE_NOTE = (
 
 
 def _body_inputs(hinge: FlexibleHinge) -> tuple[Quantity, ...]:
-    """What the hinge needs of the outboard body's own matrices."""
+    """Matrices of the outboard body that the hinge needs."""
     n, quantities = hinge.pairing.state_out.length, []
     if hinge.next_rows is not None:
         unit = hinge.pairing.state_out.unit

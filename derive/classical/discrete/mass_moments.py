@@ -1,10 +1,10 @@
-"""Moments of flexible bodies and how they follow the modal coordinates, by the kind of body.
+"""Mass moments of flexible bodies as functions of the modal coordinates, by kind of body.
 
 Rigid bodies have no modes; a beam of Euler and Bernoulli bends across its straight x axis; an
-elastic body is known by the invariants of its shapes, whatever they came from.  The moments are
-m, S_0 = int r0, J_0 = int (r0.r0 1 - r0 r0^T), S_t = int phi, E_k = int r0 phi_k^T,
-F_kl = int phi_k phi_l^T, M_f = tr F_kl; in the plane I_0, S_r = int r0.phi, S_c = int r0 x phi,
-G_f = int (phi_x phi_y^T - phi_y phi_x^T).
+elastic body is given by the invariants of its shapes, whatever their origin.  The moments are m,
+S_0 = int r0, J_0 = int (r0.r0 1 - r0 r0^T), S_t = int phi, E_k = int r0 phi_k^T, F_kl = int phi_k
+phi_l^T, M_f = tr F_kl; in the plane I_0, S_r = int r0.phi, S_c = int r0 x phi, G_f = int (phi_x
+phi_y^T - phi_y phi_x^T).
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ ETA = "eta_p"
 
 
 class SymbolTable:
-    """Plain symbols for the entries of matrix symbols: SymPy differentiates these much faster."""
+    """Plain symbols for entries of matrix symbols, which SymPy differentiates much faster."""
 
     def __init__(self) -> None:
         self._entries: dict[sp.Basic, sp.Basic] = {}
 
     def of(self, symbol: sp.MatrixSymbol) -> sp.Matrix:
-        """The matrix of plain symbols that stands for a matrix symbol."""
+        """Matrix of plain symbols that represents a matrix symbol."""
         symbols = sp.Matrix(
             *symbol.shape, lambda i, j: sp.Symbol(f"{symbol.name}__{i}_{j}", real=True)
         )
@@ -37,7 +37,7 @@ class SymbolTable:
         return symbols
 
     def back(self, matrix: sp.MatrixBase) -> Matrix:
-        """The matrix in entries of matrix symbols again."""
+        """Matrix in terms of entries of matrix symbols."""
         return Matrix(matrix.xreplace(self._entries))
 
 
@@ -53,7 +53,7 @@ class BodyMoments:
 
 
 def symmetric_quantity(name: str, size: int, unit: str, meaning: str) -> Quantity:
-    """A symmetric matrix."""
+    """Quantity of a symmetric matrix."""
     return Quantity(sp.MatrixSymbol(name, size, size), unit, meaning, symmetric=True)
 
 
@@ -73,7 +73,7 @@ def modal_inputs(modes: int, gram: str = "M_f") -> tuple[Quantity, ...]:
 
 
 def planar_moments(modes: int, letters: SymbolTable, kind: str) -> BodyMoments:
-    """Moments in the plane.  `kind`: rigid (no modes), beam (bending of the x axis) or elastic."""
+    """Planar moments; `kind`: rigid (no modes), beam (bending of the x axis) or elastic."""
     first_moments, inertia = vector("S_0", 2), sp.MatrixSymbol("I_0", 1, 1)
     inputs = [
         MASS,
@@ -124,9 +124,9 @@ def _planar_body_moments(
     modes: int,
     letters: SymbolTable,
     kind: str,
-    given: tuple[tuple[Quantity, ...], dict[str, sp.Matrix]],
+    shape_data: tuple[tuple[Quantity, ...], dict[str, sp.Matrix]],
 ) -> BodyMoments:
-    inputs, symbols = given
+    inputs, symbols = shape_data
     eta = letters.of(vector(ETA, modes))
     shift, radial_product, cross_product = _planar_invariants(modes, kind, symbols)
     gram = symbols["M_f"]
@@ -154,19 +154,19 @@ def _planar_body_moments(
 
 
 def _planar_invariants(
-    modes: int, kind: str, known: dict[str, sp.Matrix]
+    modes: int, kind: str, symbols: dict[str, sp.Matrix]
 ) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
     """S_t, S_r, G_f."""
     if kind == "beam":
-        shift = sp.zeros(1, modes).col_join(known["s"].T)
+        shift = sp.zeros(1, modes).col_join(symbols["s"].T)
         return shift, sp.zeros(modes, 1), sp.zeros(modes)
-    cross_product = known["G_f"]
+    cross_product = symbols["G_f"]
     skew = sp.Matrix(modes, modes, lambda i, j: _skew_entry(cross_product, i, j))
-    return known["S_t"], known["S_r"], skew
+    return symbols["S_t"], symbols["S_r"], skew
 
 
 def _skew_entry(matrix: sp.Matrix, i: int, j: int) -> sp.Expr:
-    """Entry of a skew matrix of which the part above the diagonal is read."""
+    """Entry of a skew matrix that is given by the part above its diagonal."""
     if i == j:
         return sp.Integer(0)
     return matrix[i, j] if i < j else -matrix[j, i]
@@ -199,7 +199,7 @@ _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def spatial_moments(modes: int, letters: SymbolTable, kind: str, planes: str = "") -> BodyMoments:
-    """Moments in space.  Of a beam `planes` names the direction of each mode, such as "yz"."""
+    """Spatial moments; for a beam `planes` gives the direction of each mode, such as "yz"."""
     inputs = [
         MASS,
         Quantity(vector("S_0", 3), "kg*m", "first moments at rest, frame axes"),

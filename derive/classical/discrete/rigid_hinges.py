@@ -1,8 +1,8 @@
 """Fixed and smooth hinges between rigid and flexible bodies, planar and spatial.
 
-Only the rotation of the sections beside the hinge tells the pairings apart.  In the plane
-theta + Theta eta is the angle of a section; in space psi + S (eta - eta_p) is the small rotation
-from its predicted orientation, S the section rotation per mode in inertial axes.
+The pairings differ only in the rotation of the sections at the hinge.  In the plane theta + Theta
+eta is the angle of a section; in space psi + S (eta - eta_p) is the small rotation from its
+predicted orientation, S the section rotation per mode in inertial axes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def section_rotation(pair: Pairing, end: str) -> sp.MatrixExpr:
 
 
 def section_slopes(space: Space, modes: int, end: str) -> sp.MatrixSymbol:
-    """Section rotation per mode beside the end I or O of the hinge."""
+    """Section rotation per mode at the end I or O of the hinge."""
     name = "Theta" if space.planar else "S"
     return sp.MatrixSymbol(f"{name}_{end}", space.turns, modes)
 
@@ -64,7 +64,7 @@ def _transmission_equations(pair: Pairing) -> tuple[Equation, ...]:
 def fixed_hinge(
     pair: Pairing, element: str, source: str, equation: str, number: str = ""
 ) -> Derivation:
-    """A weld: one point, one orientation but for a constant."""
+    """A weld: common point, constant relative orientation."""
     turns = pair.space.turns
     name = "gamma" if pair.space.planar else "beta"
     meaning = (
@@ -145,7 +145,7 @@ def _condition_entry(i: int, j: int, first: int, length: int, effort: sp.MatrixS
 def pin_hinge(
     pair: Pairing, element: str, source: str, equation: str, number: str = ""
 ) -> Derivation:
-    """Pin in space: one free angle about an axis; the next pin's axis turns with its section."""
+    """Pin in space: one free angle; the next pin's axis rotates with its section."""
     axis, free = vector("a", 3), vector("x_turn", 1)
     rotation_equation = Equation(
         "rotation about the axis alone", section_rotation(pair, "O"),

@@ -1,8 +1,8 @@
 """Spring hinges between rigid and flexible bodies: linear springs and dampers, torsion.
 
-The springs turn with the inboard section: their load is that of the predictor, turned with it,
-less Z = k + C c times what their elongation changes in the section's axes (law k nu + c nud with
-the time map nud = C nu + D).  The inboard side also feels d x q.
+The springs rotate with the inboard section: their load is that of the predictor, rotated with it,
+less Z = k + C c times the change of their elongation in the section's axes (law k nu + c nud with
+the time map nud = C nu + D).  The inboard side is also loaded by d x q.
 """
 
 from __future__ import annotations
@@ -21,7 +21,10 @@ C = MAP_C[0, 0]
 
 
 def planar_spring(pair: Pairing, element: str, source: str, equation: str) -> Derivation:
-    """Two linear springs and a torsion spring, m = -(k_1 x + k_3 x^3 + c_r xd), x = phi - phi_0."""
+    """Two linear springs and a torsion spring m = -(k_1 x + k_3 x^3 + c_r xd).
+
+    x = phi - phi_0.
+    """
     d_s, q_s = vector("d_s", 2), vector("q_s", 2)
     turn = section_rotation(pair, "I") - vector("theta_s", 1)
     r_i, m_i, q_i = (pair.at_input(name) for name in "rmq")
@@ -94,7 +97,7 @@ def _planar_inputs() -> tuple[Quantity, ...]:
 
 
 def _impedance(name: str, size: int) -> sp.MatrixExpr:
-    """k + C c."""
+    """k + C c of linear springs and dampers."""
     return sp.MatrixSymbol(f"k_{name}", size, size) + C * sp.MatrixSymbol(f"c_{name}", size, size)
 
 
@@ -129,7 +132,7 @@ def _compliance_equations(shifts: int, turns: int) -> tuple[Equation, ...]:
 
 
 def spatial_spring(pair: Pairing, element: str, source: str, equation: str) -> Derivation:
-    """Linear and torsional springs of any tangent, about the load at the predictor."""
+    """Linear and torsional springs with any tangent, linearised at the predictor."""
     d_s, q_s, m_s = vector("d_s", 3), vector("q_s", 3), vector("m_s", 3)
     turn, outboard_rotation = section_rotation(pair, "I"), section_rotation(pair, "O")
     r_i, m_i, q_i = (pair.at_input(name) for name in "rmq")
@@ -205,7 +208,7 @@ def _spatial_law_equations() -> tuple[Equation, ...]:
 
 
 def _carried_row_equations(pair: Pairing) -> tuple[Equation, ...]:
-    """Rows on z_I: turns of both sections, change of the elongation, moment."""
+    """Rows on z_I: rotations of both sections, change of the elongation, moment."""
     space, state = pair.space, pair.state_in
     d_s, q_s, m_s = (
         vector("d_s", space.shifts),
@@ -269,7 +272,7 @@ def _section_rotation_rows(pair: Pairing) -> Matrix:
 
 
 def _elimination_matrices(pair: Pairing) -> tuple[sp.Basic, Matrix]:
-    """E and G, by blocks of the state behind the hinge."""
+    """E and G, by blocks of the state on the outboard side of the hinge."""
     space, state, modes = pair.space, pair.state_in, pair.outboard
     _, change, moment, angle = _row_symbols(pair)
     outboard_rotation: sp.Basic = angle

@@ -1,11 +1,11 @@
 """State vectors of the discrete-time form: positions, angles, loads, modal coordinates, 1.
 
 Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 2019, ch. 8, (8.63) to (8.65).
-In the plane z = [r; theta; m; q; eta; 1], 7 + n numbers (10 with three modes), in space
-z = [r; psi; m; q; eta; 1], 13 + n.  r is the position of the section, theta the angle of the
-floating frame, psi the rotation vector (inertial axes) from the frame's predicted orientation to
-the wanted one, eta the modal coordinates of the body that the end belongs to (rigid: none).
-m and q are the moment and the force of the inboard on the outboard side, inertial axes.
+In the plane z = [r; theta; m; q; eta; 1], 7 + n numbers (10 with three modes), in space z = [r;
+psi; m; q; eta; 1], 13 + n.  r is the position of the section, theta the angle of the floating
+frame, psi the rotation vector (inertial axes) from the frame's predicted orientation to the unknown
+one, eta the modal coordinates of the body that the end belongs to (rigid: none).  m and q are the
+moment and the force of the inboard on the outboard side, inertial axes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ BOOK = "Rui, Wang, Zhang, Transfer Matrix Method for Multibody Systems, Wiley 20
 
 
 class Space:
-    """The plane or space: sizes, cross products and the units of a state."""
+    """Plane or space: sizes, cross products and units of a state."""
 
     def __init__(self, planar: bool) -> None:
         self.planar = planar
@@ -30,11 +30,11 @@ class Space:
 
     @property
     def rigid(self) -> int:
-        """Rigid degrees of freedom."""
+        """Number of rigid degrees of freedom."""
         return self.shifts + self.turns
 
     def state(self, modes: int) -> StateVector:
-        """The state vector of an end of a body with so many modes."""
+        """State vector of an end of a body with this number of modes."""
         has_modes = bool(modes)
         return StateVector(
             ("r", self.angle, "m", "q", *("eta",) * has_modes),
@@ -43,7 +43,7 @@ class Space:
         )
 
     def length(self, modes: int) -> int:
-        """Numbers in a state."""
+        """Number of entries of a state."""
         return 2 * self.rigid + modes + 1
 
     def moment(self, lever: sp.Basic, force: sp.Basic) -> sp.Basic:
@@ -60,7 +60,7 @@ class Space:
 
 
 def rotate_plane_column(column: sp.Basic) -> Matrix:
-    """A plane column turned by +90 degrees, entry by entry."""
+    """Plane column rotated by +90 degrees, entry by entry."""
     return Matrix([-column[1, 0], column[0, 0]])
 
 
@@ -68,7 +68,7 @@ PLANE, SPACE = Space(True), Space(False)
 
 
 def rows_of(state: StateVector, name: str) -> Matrix:
-    """Rows of the unit matrix that pick the block `name` out of a state ("1": the last number)."""
+    """Rows of the unit matrix that select block `name` of a state ("1": the last number)."""
     starts = dict(zip(state.names, _block_starts(state), strict=True)) | {"1": state.length - 1}
     sizes = dict(zip(state.names, state.sizes, strict=True)) | {"1": 1}
     start = starts[name]

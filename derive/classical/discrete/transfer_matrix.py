@@ -71,7 +71,7 @@ def transfer_equations(statement: BodyStatement) -> tuple[Equation, ...]:
 
 
 def _predictor_step(space: Space, modes: int) -> Matrix:
-    """Y: y - y_p in terms of z_I; the spatial angle is a step already."""
+    """Y: y - y_p in terms of z_I; the spatial angle is already an increment."""
     state = space.state(modes)
     names = [("r", vector("r_p", space.shifts)), (space.angle, None)]
     if space.planar:
@@ -117,7 +117,7 @@ def _end_equations(statement: BodyStatement) -> tuple[Equation, ...]:
 
 
 def _output_end_shapes(statement: BodyStatement) -> tuple[sp.Basic, sp.Basic]:
-    """Place at rest and shapes of the output end, frame axes."""
+    """Position at rest and shapes of the output end, frame axes."""
     space, modes = statement.space, statement.modes
     if statement.kind == "beam" and space.planar:
         length, deflection = sp.MatrixSymbol("L", 1, 1), sp.MatrixSymbol("phi_O", 1, modes)
@@ -129,7 +129,7 @@ def _output_end_shapes(statement: BodyStatement) -> tuple[sp.Basic, sp.Basic]:
 
 
 def _modal_row_equation(space: Space, modes: int) -> Equation:
-    """Modal balance with q_O, m_O of z_I; the loads turn against the frame by its own turn."""
+    """Modal balance with q_O, m_O of z_I; loads rotate relative to the frame by its rotation."""
     state = space.state(modes)
     n, size, turns = state.length, space.rigid + modes, space.turns
     step = sp.MatrixSymbol("Y", size, n)

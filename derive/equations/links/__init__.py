@@ -1,1 +1,1 @@
-"""A rigid body behind a hinge as one element, a kernel a pass."""
+"""Combined kernels of a rigid body and its inboard hinge, one per pass."""

@@ -1,18 +1,19 @@
-"""A rigid body behind a hinge that moves along and about z, in four kernels for the looped engine.
+"""A rigid body outboard of a hinge that moves along and about z: four kernels.
 
-Between the frames of such a body and of its parent lie two axial screws, both of them chosen when
-the scene is packed (modified Denavit-Hartenberg parameters): a constant one about x, and the
-hinge's own about z with its constant angle and shift.  One link is
+The transformation from the parent consists of two axial screws, chosen when the scene is packed
+(modified Denavit-Hartenberg parameters): a constant one about x, and the hinge's own about z with
+its constant angle and shift.  One link is
 
-    turn       angle about z, whose sine and cosine the engine takes two links at a time
-    forward    bias motion of the body and the load that it needs
-    condense   own inertia and what hangs on the body; elimination; transport to the parent
+    turn       angle about z, whose sine and cosine the engine computes for two links at a time
+    forward    bias motion of the body and the load that it requires
+    condense   own inertia and outboard bodies; elimination; transport to the parent
     recover    accelerations
 
-and nothing of it but turn, d, e, G and g has to wait in memory between the passes.
+and only turn, d, e, G and g are stored between the passes.
 
-S is carried across the screws by plain products: the double angle would save a tenth of the time
-and cost up to a digit and a half behind long chains, where small moments stand beside large ones.
+S is carried across the screws by plain products: the double-angle form would save a tenth of the
+time but lose up to one and a half digits outboard of long chains, where small moments are
+differences of large ones.
 """
 
 from __future__ import annotations
@@ -62,7 +63,7 @@ def _about_z() -> Stage:
 
 
 def along_z(place: HingePlace) -> tuple[sp.Expr, sp.Expr] | None:
-    """Angle and shift as functions of q of a hinge that moves about and along z alone."""
+    """Angle and shift as functions of q, for a hinge that moves only about and along z."""
     rotation, position = place.rotation, place.position
     if any(rotation[k, 2] != (k == 2) or rotation[2, k] != (k == 2) for k in range(3)):
         return None
@@ -74,17 +75,17 @@ def along_z(place: HingePlace) -> tuple[sp.Expr, sp.Expr] | None:
     return angles[0] if angles else sp.Integer(0), position[2]
 
 
-def _place(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
-    found = along_z(motion)
-    assert found is not None
-    angle, shift = (motion.in_arrays(sp.Matrix([value]))[0] for value in found)
+def _angle_and_shift(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
+    screw = along_z(motion)
+    assert screw is not None
+    angle, shift = (motion.in_arrays(sp.Matrix([value]))[0] for value in screw)
     return angle, shift
 
 
 def turn(motion: HingeMotion) -> Derivation:
     """Angle about z."""
     theta = Quantity(symbol("turn", 1), "rad", "angle about z, in place of its cosine and sine")
-    value = _place(motion)[0] + LINK.symbol[3, 0]
+    value = _angle_and_shift(motion)[0] + LINK.symbol[3, 0]
     return Derivation(
         motion.hinge.name,
         f"angle of the {motion.hinge.title}",
@@ -95,9 +96,9 @@ def turn(motion: HingeMotion) -> Derivation:
 
 
 def forward(motion: HingeMotion, body: Body) -> Derivation:
-    """Shift along z, bias motion of the body, and the load that this motion needs."""
-    _, shift = _place(motion)
-    link, rest = LINK.symbol, symbol("motion_Q", 9)
+    """Shift along z, bias motion of the body, and the load that this motion requires."""
+    _, shift = _angle_and_shift(motion)
+    link, motion_q = LINK.symbol, symbol("motion_Q", 9)
     between = symbol("motion_x", 9)
     rates = symbol("qdot", motion.rates.rows)
     return Derivation(
@@ -108,8 +109,8 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
         (
             *_about_x().behind(PARENT_MOTION.symbol, between),
             Equation("shift along z", SHIFT.symbol, sp.ImmutableDenseMatrix([shift + link[4, 0]])),
-            *_about_z().behind(between, rest),
-            Equation("bias motion", MOTION.symbol, body_motion(motion, rest)),
+            *_about_z().behind(between, motion_q),
+            Equation("bias motion", MOTION.symbol, body_motion(motion, motion_q)),
             Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
@@ -117,9 +118,9 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
     )
 
 
-def body_motion(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
-    """Motion of P from that of Q in P axes: the hinge's own velocity and acceleration added."""
-    w, wd, rdd = (part(rest, n) for n in (0, 3, 6))
+def body_motion(motion: HingeMotion, motion_q: sp.MatrixSymbol) -> sp.BlockMatrix:
+    """Motion of P from that of Q, in P axes, plus the hinge's velocity and acceleration."""
+    w, wd, rdd = (part(motion_q, n) for n in (0, 3, 6))
     v_own, w_own = motion.in_arrays(motion.velocity), motion.in_arrays(motion.spin)
     c = motion.in_arrays(motion.bias)
     c_v, c_w = sp.ImmutableDenseMatrix(c[:3, :]), sp.ImmutableDenseMatrix(c[3:, :])
@@ -127,15 +128,19 @@ def body_motion(motion: HingeMotion, rest: sp.MatrixSymbol) -> sp.BlockMatrix:
 
 
 def of_body(derivation: Derivation, name: str) -> sp.Basic:
-    """A definition of the body's, its parameters under this file's name."""
-    own = next(q for q in derivation.inputs if q.name == "p").symbol
+    """Definition from the body's derivation, with its parameters renamed to those here."""
+    parameters = next(q for q in derivation.inputs if q.name == "p").symbol
     matrix = sp.ImmutableDenseMatrix(derivation.definition(name))
-    return matrix.xreplace({own[i, 0]: BODY.symbol[i, 0] for i in range(int(own.rows))})
+    return matrix.xreplace(
+        {parameters[i, 0]: BODY.symbol[i, 0] for i in range(int(parameters.rows))}
+    )
 
 
 def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation:
-    """S and e of the body and all behind it at the parent's origin, parent's axes; with a `rotor`
-    its inertia adds to D, and S keeps its row along the hinge."""
+    """S and e of the body and all outboard bodies at the parent's origin, parent's axes.
+
+    With a `rotor` its inertia is added to D, and S keeps its row along the hinge.
+    """
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
     inputs = hinge_quantities(motion.hinge)[:1]
     elimination = eliminate(nu, subspace, inputs, rotor=BODY.symbol[10, 0] if rotor else None)
@@ -162,12 +167,12 @@ def condense(motion: HingeMotion, body: Body, rotor: bool = False) -> Derivation
 
 
 def floor(body: Body) -> sp.ImmutableDenseMatrix:
-    """What a pivot must exceed, from the body's own inertia."""
+    """Lower limit of pivots, from the body's own inertia."""
     return floor_of(of_body(body_kernels.inertia(body), "S"))
 
 
 def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:
-    """udot = g - G X delta_I and the body's own deviation X delta_I + H udot."""
+    """udot = g - G X delta_I and the deviation X delta_I + H udot of the body."""
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
     gain, offset = gains(nu)
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")

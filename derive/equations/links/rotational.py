@@ -1,16 +1,15 @@
-"""A rigid body behind a hinge that turns about a point, in four kernels for the looped engine.
+"""A rigid body outboard of a hinge that rotates about a point: four kernels.
 
-The link of a ball hinge.  Its speeds are given in the body's axes, so that these are not for
-choosing and the way from the parent is any rotation and place, Rt and ro of `sweep`:
+The link of a ball hinge.  Its speeds are given in the body's axes, so these cannot be chosen, and
+the transformation from the parent is a general rotation and position, Rt and ro of `riccati_sweep`:
 
     turn       rotation to the parent, from the coordinates
-    forward    bias motion of the body and the load that it needs
-    condense   own inertia and what hangs on the body; elimination; transport to the parent
+    forward    bias motion of the body and the load that it requires
+    condense   own inertia and outboard bodies; elimination; transport to the parent
     recover    accelerations
 
-The ports are those of a link along and about z (`axial`), and they mean the same: what the hinge's
-coordinates say of the way to the parent is `turn`, and of G and g stands what the factored
-elimination leaves to be done (`factored`).
+Ports have the names and meanings of `axial`: `turn` is the part of the transformation that depends
+on the coordinates, and G and g hold the factors of `ldl_elimination` for back-substitution.
 """
 
 from __future__ import annotations
@@ -45,21 +44,20 @@ LINK = Quantity(
     symbol("link", 12), "", "rotation, inboard hinge axes to parent axes; inboard point (m)"
 )
 TURN = Quantity(symbol("turn", 3, 3), "", "rotation, body axes to parent axes")
-#: Along an axis there is a shift; about a point there is none.
+#: An axial link has a shift; a rotation about a point has none.
 NO_SHIFT = Quantity(symbol("d", 0), "m", "shift")
 
 
 def turns_about_a_point(hinge: Hinge) -> bool:
-    """Whether a hinge leaves its point where it is, and its speeds are the relative angular
-    velocity in the body's axes, which is the rate of no coordinates."""
+    """Whether a hinge only rotates and its speeds are the angular velocity in body axes."""
     if hinge.speeds is None or place_of(hinge).position.is_zero_matrix is not True:
         return False
     turning = sp.Matrix.vstack(sp.zeros(3, 3), sp.eye(3))
     return moves_as(hinge, turning)
 
 
-def _way() -> tuple[Equation, Equation]:
-    """The way to the parent under the names of the sweep's equations."""
+def _parent_transform() -> tuple[Equation, Equation]:
+    """Transformation to the parent, in the names of the sweep's equations."""
     return (
         Equation("rotation to the parent", R.symbol, TURN.symbol),
         Equation("lever in the parent", SHIFT.symbol, part(LINK.symbol, 9)),
@@ -80,8 +78,8 @@ def turn(motion: HingeMotion) -> Derivation:
 
 
 def forward(motion: HingeMotion, body: Body) -> Derivation:
-    """Bias motion of the body, and the load that this motion needs."""
-    rest, rates = symbol("motion_Q", 9), symbol("qdot", motion.rates.rows)
+    """Bias motion of the body, and the load that this motion requires."""
+    motion_q, rates = symbol("motion_Q", 9), symbol("qdot", motion.rates.rows)
     w, wd, rdd = (part(PARENT_MOTION.symbol, n) for n in (0, 3, 6))
     carrier, back = symbol("K", 3, 3), R.symbol.T
     lever = part(SHIFT.symbol, 0)
@@ -91,15 +89,15 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
         (LINK, TURN, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
         (NO_SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
         (
-            *_way(),
+            *_parent_transform(),
             Equation("no shift", NO_SHIFT.symbol, sp.ImmutableDenseMatrix(sp.zeros(0, 1))),
             Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
             Equation(
                 "bias motion before the hinge",
-                rest,
+                motion_q,
                 stack(back * w, back * wd, back * (rdd + carrier * lever)),
             ),
-            Equation("bias motion", MOTION.symbol, body_motion(motion, rest)),
+            Equation("bias motion", MOTION.symbol, body_motion(motion, motion_q)),
             Equation("load", OWN_LOAD.symbol, of_body(body_kernels.bias_load(body), "e")),
             Equation("coordinate rates", rates, motion.in_arrays(motion.rates)),
         ),
@@ -115,14 +113,14 @@ def _gains(nu: int) -> tuple[Quantity, Quantity]:
 
 
 def condense(motion: HingeMotion, body: Body) -> Derivation:
-    """S and e of the body and all behind it at the parent's P, parent's axes."""
+    """S and e of the body and all outboard bodies at the parent's P, parent's axes."""
     nu, subspace = motion.nu, motion.in_arrays(motion.subspace)
     inputs = hinge_quantities(motion.hinge)[:1]
     elimination = eliminate_factored(nu, subspace, inputs)
     tau = next(q for q in elimination.inputs if q.name == "tau")
     gain, offset = _gains(nu)
-    factor, left = symbol("F", nu, nu), symbol("Z", nu, 6)
-    kept = sp.ImmutableDenseMatrix(nu, 6, lambda i, j: left[i, j] if j < 3 else factor[i, j - 3])
+    factor, z = symbol("F", nu, nu), symbol("Z", nu, 6)
+    stored = sp.ImmutableDenseMatrix(nu, 6, lambda i, j: z[i, j] if j < 3 else factor[i, j - 3])
     mass = of_body(body_kernels.inertia(body), "S")
     steps, carried = congruence("S_Q")
     return Derivation(
@@ -131,13 +129,13 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
         (LINK, TURN, NO_SHIFT, BODY, *inputs, OUTER_S, OUTER_E, OWN_LOAD, tau),
         (gain, offset, OUT_S, OUT_E),
         (
-            *_way(),
+            *_parent_transform(),
             Equation(
                 "S of body and outboard part", S.symbol, mass + OUTER_S.symbol, symmetric=True
             ),
             Equation("e of body and outboard part", E.symbol, OWN_LOAD.symbol + OUTER_E.symbol),
             *elimination.definitions,
-            Equation("Z along forces, and F", gain.symbol, kept),
+            Equation("Z along forces, and F", gain.symbol, stored),
             Equation("diag(d)^-1 y", offset.symbol, symbol("z", nu)),
             *steps,
             Equation("X^T S_Q X", OUT_S.symbol, carried),
@@ -148,13 +146,16 @@ def condense(motion: HingeMotion, body: Body) -> Derivation:
 
 
 def recover(motion: HingeMotion) -> Derivation:
-    """udot = v - X delta_I about the axes, v = L^-T (z - Z X delta_I) along them; the body's own
-    deviation X delta_I + H udot, which about the axes is v."""
+    """udot and the deviation of the body from the factored elimination.
+
+    udot = v - X delta_I about the axes, v = L^-T (z - Z X delta_I) along them; the deviation is
+    X delta_I + H udot, which about the axes is v.
+    """
     nu = motion.nu
     gain, offset = _gains(nu)
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")
     carried, factor, v = symbol("delta_Q", 6), symbol("F", nu, nu), symbol("v", nu)
-    along = sp.ImmutableDenseMatrix(nu, 3, lambda i, j: gain.symbol[i, j])
+    z_linear = sp.ImmutableDenseMatrix(nu, 3, lambda i, j: gain.symbol[i, j])
     kept = sp.ImmutableDenseMatrix(nu, nu, lambda i, j: gain.symbol[i, 3 + j])
     return Derivation(
         motion.hinge.name,
@@ -162,13 +163,13 @@ def recover(motion: HingeMotion) -> Derivation:
         (LINK, TURN, NO_SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
         (rates, DELTA),
         (
-            *_way(),
+            *_parent_transform(),
             Equation("X delta_I", carried, outboard_deviation()),
             Equation("F", factor, kept),
             Equation(
                 "v = L^-T (z - Z X delta_I)",
                 v,
-                Triangular(factor, offset.symbol - along * part(carried, 0), transposed=True),
+                Triangular(factor, offset.symbol - z_linear * part(carried, 0), transposed=True),
             ),
             Equation("udot = v - W X delta_I", rates.symbol, v - part(carried, 3)),
             Equation("deviation of the body", DELTA.symbol, stack(part(carried, 0), v)),
