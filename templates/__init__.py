@@ -1,1 +1,1 @@
-"""Jinja templates of the C text; `derive.print.render` fills them."""
+"""Templates of the C text, rendered by `derive.codegen.template_rendering`."""

@@ -1,5 +1,5 @@
-/* Many states, MSTMM_LANES at a time.  The last group is filled up with its last state, so that a
- * state's numbers depend neither on how many there are nor on where it stands among them. */
+/* Many states, MSTMM_LANES at a time.  The last group repeats its last state, so that the result of
+ * a state depends neither on the number of states nor on its position among them. */
 typedef struct {
     lanes_t p[MSTMM_SOME(MSTMM_NP)], t[1], q[MSTMM_SOME(MSTMM_NQ)], u[MSTMM_SOME(MSTMM_NU)];
     lanes_t memory[MSTMM_SOME(MSTMM_N_MEMORY)], efforts[MSTMM_SOME(MSTMM_NU)];
@@ -19,7 +19,7 @@ typedef struct {
     } while (0)
 #define MSTMM_LIST(...) __VA_ARGS__
 
-/* A square of numbers, turned over its diagonal in registers. */
+/* Transpose a square block in registers. */
 MSTMM_INLINE void mstmm_turn(lanes_t *v)
 {
 #if MSTMM_LANES == 8
@@ -42,21 +42,21 @@ MSTMM_INLINE void mstmm_turn(lanes_t *v)
 #endif
 }
 
-/* Whether rows can be moved as whole vectors.  Rows shorter than a vector reach into the next row:
- * there must be one, and when rows are written it must come later. */
+/* Whether rows can be copied as whole vectors.  A vector longer than a row overlaps the next row,
+ * which must exist, and on output must be written later. */
 MSTMM_INLINE int mstmm_roomy(int width, long long stride, long long left)
 {
     return left >= MSTMM_LANES && (width >= MSTMM_LANES ||
                                    (left - MSTMM_LANES) * stride >= MSTMM_LANES - width);
 }
 
-/* First column of the block at i: the last block of a long row overlaps the one before it. */
+/* First column of the block at i; the last block of a long row overlaps the previous one. */
 MSTMM_INLINE int mstmm_block(int i, int width)
 {
     return width >= MSTMM_LANES && i + MSTMM_LANES > width ? width - MSTMM_LANES : i;
 }
 
-/* Rows of `width` numbers -> lanes, of `left` states that are left; lanes without a state repeat
+/* Load rows of `width` numbers into lanes; `left` states remain, and lanes without a state repeat
  * the last row. */
 MSTMM_INLINE void mstmm_load(lanes_t *lanes, const double *rows, int width, long long stride,
                              long long left)
@@ -80,7 +80,7 @@ MSTMM_INLINE void mstmm_load(lanes_t *lanes, const double *rows, int width, long
             lanes[i][k] = rows[(k < left ? k : left - 1) * stride + i];
 }
 
-/* Lanes -> rows, for the lanes that have a state. */
+/* Store the lanes that have a state as rows. */
 MSTMM_INLINE void mstmm_keep(double *rows, const lanes_t *lanes, int width, long long left)
 {
     if (mstmm_roomy(width, width, left)) {

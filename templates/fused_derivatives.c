@@ -1,5 +1,5 @@
 /* Derivatives of states along directions, MSTMM_LANES directions of one state at a time.  The last
- * group is filled up with its last direction. */
+ * group repeats its last direction. */
 typedef struct {
     double p[MSTMM_SOME(MSTMM_NP) * MSTMM_LANES], t[MSTMM_LANES];
     double q[MSTMM_SOME(MSTMM_NQ) * MSTMM_LANES], u[MSTMM_SOME(MSTMM_NU) * MSTMM_LANES];
@@ -7,7 +7,7 @@ typedef struct {
     double efforts[MSTMM_SOME(MSTMM_NU) * MSTMM_LANES];
 } __attribute__((aligned(64))) mstmm_shared;
 
-/* The same numbers in every lane. */
+/* Copy a row to every lane. */
 MSTMM_INLINE void mstmm_spread(double *lanes, const double *row, int width)
 {
     for (int i = 0; i < width; i++)

@@ -1,8 +1,8 @@
-/* Four sines and cosines for the kernel of one state. */
+/* Four sines and cosines at a time, for the kernel of one state. */
 typedef double four_t __attribute__((vector_size(32)));
 typedef long long four_bits_t __attribute__((vector_size(32)));
 
-/* Whether every element is within the range of the polynomials: a NaN is not. */
+/* Whether every element is within the range of the polynomials; false for NaN. */
 MSTMM_INLINE int four_sincos_near(four_t x)
 {
     const four_bits_t near = (x >= -MSTMM_SINCOS_RANGE) & (x <= MSTMM_SINCOS_RANGE);

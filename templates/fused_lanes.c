@@ -1,5 +1,5 @@
-/* Several states side by side, one in each lane of a vector as wide as the processor has.  What is
- * not arithmetic goes through the C library, lane by lane. */
+/* Several states at a time, one per lane of the widest vector.  Functions without vector
+ * instructions call the C library lane by lane. */
 #if defined __AVX512F__ && defined __AVX512DQ__
 #define MSTMM_LANES 8
 #elif defined __AVX__
@@ -57,14 +57,14 @@ MSTMM_INLINE lanes_t lanes_sqrt(lanes_t a)
 #endif
     return root;
 }
-/* First failure of each lane. */
+/* Record the first failure of each lane. */
 MSTMM_INLINE void lanes_fail(int *codes, mask_t truth, int code)
 {
     for (int i = 0; i < MSTMM_LANES; i++)
         if (!truth[i] && codes[i] == 0) codes[i] = code;
 }
 
-/* Out of line: a call for every lane dwarfs the call for all. */
+/* Not inlined: the calls per lane dominate the cost. */
 #define MSTMM_LANES_ONE(name)                                                                      \
     MSTMM_RARE void lanes_each_##name(lanes_t *a)                                                  \
     {                                                                                              \

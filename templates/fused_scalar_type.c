@@ -1,4 +1,4 @@
-/* Numbers one at a time.  Nothing is included: the text needs no header and compiles quickly. */
+/* Scalar arithmetic.  No headers are included, so that the text compiles quickly. */
 #define MSTMM_PI MSTMM_LITERAL(3.14159265358979323846264338327950288419717)
 #define MSTMM_INLINE static inline __attribute__((always_inline, unused))
 #define MSTMM_RARE static __attribute__((noinline, cold, unused))
@@ -18,7 +18,7 @@ MSTMM_ONE(sinh) MSTMM_ONE(cosh) MSTMM_ONE(tanh)
 MSTMM_ONE(exp) MSTMM_ONE(log)
 MSTMM_TWO(pow) MSTMM_TWO(atan2)
 
-/* A NaN is never hidden by a minimum, a maximum or a sign, and it is neither true nor not. */
+/* Minimum, maximum and sign propagate NaN; as a truth value NaN is neither true nor false. */
 MSTMM_INLINE real real_abs(real a) { return real_fabs(a); }
 MSTMM_INLINE real real_sign(real a) { return a > 0 ? 1 : (a < 0 ? -1 : a); }
 MSTMM_INLINE real real_min(real a, real b) { return a < b || a != a ? a : b; }

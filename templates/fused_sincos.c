@@ -1,11 +1,11 @@
 /* Sine and cosine of a vector of arguments.
  *
- * x = k pi/2 + r: k pi/2 is taken off in two parts, of which the first has 42 bits, so that its
- * product with k is exact up to |k| = 2047 with fused multiply-add and without.  On |r| <= pi/4
+ * x = k pi/2 + r: k pi/2 is subtracted in two parts; the first has 42 bits, so that its
+ * product with k is exact up to |k| = 2047 with or without fused multiply-add.  On |r| <= pi/4
  * the polynomials are Chebyshev fits of (sin r / r - 1) / r^2 and (cos r - 1 + r^2 / 2) / r^4 in
  * r^2, of relative error below 1e-18.  The quadrant is read from the last bits of
- * x 2/pi + 1.5 2^52.  Beyond MSTMM_SINCOS_RANGE, and for NaN, the C library is asked, element by
- * element.  None of it survives -ffast-math. */
+ * x 2/pi + 1.5 2^52.  Beyond MSTMM_SINCOS_RANGE, and for NaN, the C library is called element by
+ * element.  Do not compile with -ffast-math. */
 #define MSTMM_SINCOS_RANGE 1200.0
 
 #define MSTMM_SINCOS(vector_t, bits_t, width, name)                                                \
