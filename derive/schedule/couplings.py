@@ -18,7 +18,7 @@ TOLD_OF_BIAS = replace(
     TOLD, ports=(("y", "body.chosen"), ("z", "pending.tau"), ("l", "pending.known"))
 )
 #: The same for a hinge that closes a loop: accelerations along its rows, and prescribed ones.
-_TOLD_BY_OWN = (
+_OWN_ROW_TERMS = (
     call("generic{nu}.answered", y="closure.l", z="own.tau", l="own.known"),
     call("generic{nu}.answered", y="body.s", z="own.tau", l="own.known"),
 )
@@ -32,7 +32,7 @@ OF_OWN = ForEach(
                 call("loops.act", J="closure.J_B[6 * k]", tau="own.tau[k]", e="own.outer"),
             ),
         ),
-        *_TOLD_BY_OWN,
+        *_OWN_ROW_TERMS,
     ),
 )  # fmt: skip
 #: Additional contribution where the bias motion chooses accelerations.
@@ -42,7 +42,7 @@ OF_OWN_BIAS = ForEach(
     steps=(call("generic{nu}.answered", y="body.chosen", z="own.tau", l="own.known"),),
 )
 #: The same with known multipliers.
-OWN_TOLD = ForEach(of="own", steps=_TOLD_BY_OWN)
+OWN_TOLD = ForEach(of="own", steps=_OWN_ROW_TERMS)
 
 
 def efforts_of_own(x: str, when: str) -> ForEach:

@@ -10,13 +10,13 @@ _FIELDS = (
 )  # fmt: skip
 _MOMENTS = {name: f"moments.{name}" for name in _FIELDS}
 _DRAG = {name: f"drag.{name}" for name in _FIELDS}
-_NUMBERS = {
+_SECTION_DATA = {
     name: f"section.{name}"
     for name in ("r", "phi", "theta", "g_x", "g_y", "g_z", "h_x", "h_y", "h_z")
 }
 _STATE = {"eta": "modes.eta", "etad": "modes.etad"}
-_LAID = {name: f"section.{name}" for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
-_ACROSS = {
+_MOTION_PORTS = {name: f"section.{name}" for name in ("x", "Psi", "xd", "Psid", "xdd", "Psidd")}
+_HINGE_PORTS = {
     "R": "hinge.R", "d": "hinge.d", "H6": "section.H6", "v": "hinge.v", "w": "hinge.w",
     "c": "hinge.c",
 }  # fmt: skip
@@ -24,11 +24,11 @@ _ACROSS = {
 SECTION_MOTION = Pass(
     "section_motion", "body", "Relative motion across a section of a flexible body.",
     (
-        call("modal.section", **_NUMBERS, **_STATE, Phi="section.Phi", **_LAID),
-        call("modal.outward", when="outward", fails="section", R_end="section.end", **_LAID,
-             **_ACROSS),
-        call("modal.inward", when="!outward", fails="section", R_end="section.end", **_LAID,
-             **_ACROSS),
+        call("modal.section", **_SECTION_DATA, **_STATE, Phi="section.Phi", **_MOTION_PORTS),
+        call("modal.outward", when="outward", fails="section", R_end="section.end",
+             **_MOTION_PORTS, **_HINGE_PORTS),
+        call("modal.inward", when="!outward", fails="section", R_end="section.end",
+             **_MOTION_PORTS, **_HINGE_PORTS),
         call("modal.subspace", H6="section.H6", Phi="section.Phi", H="section.H"),
         call("modal.imposed", when="inverse", H="section.H", s="modes.given", c="hinge.c",
              c_s="local.c"),

@@ -74,7 +74,7 @@ def _end(letter: str, on: str) -> tuple[Step, ...]:
 
 
 _ENDS = {f"{x}_{end}": f"local.{x}_{end}" for end in "FT" for x in "Axvw"}
-_MOVES = {name: slot for name, slot in _ENDS.items() if name[0] in "xv"}
+_END_MOTIONS = {name: slot for name, slot in _ENDS.items() if name[0] in "xv"}
 
 FORCES = Pass(
     "forces", "force", "Massless elements between two ends, added to e of both.",
@@ -82,7 +82,7 @@ FORCES = Pass(
         *_end("F", "from"),
         *_end("T", "to"),
         Copy(to="local.effort"),
-        call("frames.length", when="effort", **_MOVES, l="local.length"),
+        call("frames.length", when="effort", **_END_MOTIONS, l="local.length"),
         Evaluate(to="local.effort", expression="force.effort", given=(("length", "local.length"),),
                  when="effort"),
         call("force.wrench", fails="force", p="force.p", t="scene.t", effort="local.effort",

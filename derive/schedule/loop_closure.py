@@ -39,13 +39,14 @@ from .riccati_sweep import (
     eliminate_with_effort,
 )
 
-_MET = {"R_C": "closure.R_C", "r_e": "closure.end"}
-_OWN = {"W": "closure.W", "gap": "closure.gap"}
+_END_PORTS = {"R_C": "closure.R_C", "r_e": "closure.end"}
+_CONSTRAINT_PORTS = {"W": "closure.W", "gap": "closure.gap"}
 
 
 def _row(k: str) -> Call:
-    return call("loops.row", w=f"closure.W[6 * {k}]", **_MET, Rc="body.R", r_A="closure.lever",
-                J_A=f"closure.J_A[6 * {k}]", J_B=f"closure.J_B[6 * {k}]")  # fmt: skip
+    return call("loops.row", w=f"closure.W[6 * {k}]", **_END_PORTS, Rc="body.R",
+                r_A="closure.lever", J_A=f"closure.J_A[6 * {k}]",
+                J_B=f"closure.J_B[6 * {k}]")  # fmt: skip
 
 
 def _known(relative: str, when: str) -> Call:
@@ -57,28 +58,29 @@ def _gap(when: str) -> tuple[Call, ...]:
                  gap="closure.gap"),)  # fmt: skip
 
 
-_MEETING = (
+_RELATIVE_MOTION = (
     call("frames.pose", when="staged", A_I="connection.R", x_I="connection.r", Rc="hinge.R",
          r="hinge.d", A="body.R", x="body.r"),
     call("generic{nu}.complement", when="hinged", fails="hinge", H="hinge.H", W="closure.W"),
     call("loops.meet", A_C="body.A", x_C="body.x", A_B="outboard.A", x_B="outboard.x",
          r_e="closure.end", **BODY, R_C="closure.R_C", r_A="closure.lever", d="closure.d"),
-    call("loops.slip", **_MET, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
+    call("loops.slip", **_END_PORTS, d="closure.d", v_C="body.v", w_C="body.w", v_B="outboard.v",
          w_B="outboard.w", slip="closure.slip"),
 )  # fmt: skip
 #: A constraint defines its own directions and gap.
-_CONSTRAINED = (
-    call("loops.distance", when="distance", p="closure.p", d="closure.d", **_OWN),
-    call("loops.plane", when="plane", p="closure.p", d="closure.d", **_OWN),
+_CONSTRAINT_STEPS = (
+    call("loops.distance", when="distance", p="closure.p", d="closure.d", **_CONSTRAINT_PORTS),
+    call("loops.plane", when="plane", p="closure.p", d="closure.d", **_CONSTRAINT_PORTS),
     call("loops.rolling", when="rolling", fails="flat", p="closure.p", R_C="closure.R_C",
-         d="closure.d", **_OWN),
+         d="closure.d", **_CONSTRAINT_PORTS),
 )  # fmt: skip
-_DRIFT = call("loops.drift", **_MET, d="closure.d", slip="closure.slip", motion_C="body.motion",
-              motion_B="outboard.motion", drift="local.drift")  # fmt: skip
+_DRIFT = call("loops.drift", **_END_PORTS, d="closure.d", slip="closure.slip",
+              motion_C="body.motion", motion_B="outboard.motion",
+              drift="local.drift")  # fmt: skip
 #: Alternative for steps that close gaps by accelerations.
 _CLOSING = call("loops.closing", gap="closure.gap", rate="step.closing", relative="local.relative")
 #: Terms of rotating directions.
-_BENT = (
+_DIRECTION_RATES = (
     call("loops.distance_drift", when="distance", d="closure.d", slip="closure.slip",
          drift="local.drift"),
     call("loops.rolling_drift", when="rolling", p="closure.p", R_C="closure.R_C",
@@ -96,14 +98,14 @@ _EFFORTS = EachSpeed(
 CLOSURES = Pass(
     "closures", "body", "Rows of what closes a loop, and the load of a hinge's laws.",
     (
-        *_MEETING,
+        *_RELATIVE_MOTION,
         *_gap("gaping"),
         *_gap("placing"),
-        *_CONSTRAINED,
+        *_CONSTRAINT_STEPS,
         _known("closure.gap", "gaping"),
         _known("closure.slip", "slipping"),
         efforts_of_own("own.told", "refined"),
-        *only("!corrected !placing", _DRIFT, *_BENT, _known("local.drift", "")),
+        *only("!corrected !placing", _DRIFT, *_DIRECTION_RATES, _known("local.drift", "")),
         *only("placing", _CLOSING, _known("local.relative", "")),
         _EFFORTS,
         ForEach(
@@ -135,10 +137,10 @@ CLOSURES_LOADED = Pass(
     "closures_loaded", "body", "Rows of a hinge that closes a loop, and all the load that it puts"
     " on its bodies.",
     (
-        *_MEETING,
-        *_CONSTRAINED,
+        *_RELATIVE_MOTION,
+        *_CONSTRAINT_STEPS,
         _DRIFT,
-        *_BENT,
+        *_DIRECTION_RATES,
         _known("local.drift", ""),
         efforts_of_own("own.x", ""),
         _EFFORTS,
@@ -230,10 +232,10 @@ _MODES_ANSWERED = (
     Add(to="modes.udot", source="modes.given", when="refined"),
 )
 
-_ACROSS = {"H": "hinge.H_free", "G": "hinge.G"}
+_FACTOR_PORTS = {"H": "hinge.H_free", "G": "hinge.G"}
 
 #: Coupling of a row's column with the load and with other columns at the hinge.
-_COUPLED = only(
+_ROW_COUPLING = only(
     "moving",
     call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
     call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
@@ -254,7 +256,7 @@ def _carry_load(when: str, load: str, effort: str, remainder: str, onward: str) 
     """Load carried to the parent; a hinge on the ground only computes its efforts."""
     ports = {"e": load, "tau": effort, "y": remainder}
     return (
-        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_ACROSS, **ports,
+        call("generic{free}.push", when=f"{when} hung".strip(), **BODY, **_FACTOR_PORTS, **ports,
              e_I=onward),
         call("generic{free}.push_on_ground", when=f"{when} moving !hung".strip(),
              H="hinge.H_free", **ports),
@@ -262,10 +264,10 @@ def _carry_load(when: str, load: str, effort: str, remainder: str, onward: str) 
 
 
 #: Modal part of a column at an end of a flexible body.
-_FELT_BY_MODES = call("modal.row_felt", when="outward", H="section.H", K="pending.K",
-                      K_f="pending.modes")  # fmt: skip
+_MODAL_COLUMN = call("modal.row_felt", when="outward", H="section.H", K="pending.K",
+                     K_f="pending.modes")  # fmt: skip
 
-_ALONE = only(
+_UNSTAGED_STEPS = only(
     "!staged",
     call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
          J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
@@ -274,7 +276,7 @@ _ALONE = only(
     ForEach(
         of="pending",
         steps=(
-            _FELT_BY_MODES,
+            _MODAL_COLUMN,
             *_carry_load("!coupled", "pending.K", "zero", "pending.y", "pending.onward"),
             *only(
                 "coupled",
@@ -282,11 +284,11 @@ _ALONE = only(
                 *_carry_load("", "pending.K", "local.tau", "pending.y", "pending.onward"),
                 replace(TOLD, when=""),
             ),
-            *_COUPLED,
+            *_ROW_COUPLING,
         ),
     ),
 )  # fmt: skip
-_BY_STAGES = only(
+_STAGED_STEPS = only(
     "staged",
     *condensed("body.e"),
     _effort_remainder("local.e", "hinge.tau_free", "hinge.g"),
@@ -297,7 +299,7 @@ _BY_STAGES = only(
     ForEach(
         of="pending",
         steps=(
-            _FELT_BY_MODES,
+            _MODAL_COLUMN,
             *condensed("pending.K"),
             *only(
                 "!coupled",
@@ -314,7 +316,7 @@ _BY_STAGES = only(
             ),
             *ONWARD,
             Add(to="pending.onward", source="local.e", when="hung"),
-            *_COUPLED,
+            *_ROW_COUPLING,
         ),
     ),
 )
@@ -329,8 +331,8 @@ CARRIED = Pass(
         *FREE,
         efforts_of("pending.told", "refined"),
         FREE_EFFORTS,
-        *_ALONE,
-        *_BY_STAGES,
+        *_UNSTAGED_STEPS,
+        *_STAGED_STEPS,
     ),
     order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
@@ -353,7 +355,7 @@ ANSWERED = Pass(
         *only(
             "!staged",
             _multiplier_efforts("pending.y", "hinge.g"),
-            call("generic{free}.answer", **BODY, **_ACROSS, F="hinge.F", y="hinge.g",
+            call("generic{free}.answer", **BODY, **_FACTOR_PORTS, F="hinge.F", y="hinge.g",
                  delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),
         ),
         *only("staged", _multiplier_efforts("pending.z", "hinge.z"), *RECOVERED),

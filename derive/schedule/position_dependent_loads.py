@@ -27,12 +27,12 @@ from .pass_steps import (
     only,
 )
 
-_POSED = call("frames.placed_pose", A="body.A", p="place.z", d_A=D + "body.A", d_x=D + "body.x",
-              d_v=D + "body.v")  # fmt: skip
-_STILL = (Copy(to=D + "body.A"), Copy(to=D + "body.x"), Copy(to=D + "body.v"))
+_POSE_CHANGE = call("frames.placed_pose", A="body.A", p="place.z", d_A=D + "body.A",
+                    d_x=D + "body.x", d_v=D + "body.v")  # fmt: skip
+_NO_POSE_CHANGE = (Copy(to=D + "body.A"), Copy(to=D + "body.x"), Copy(to=D + "body.v"))
 
 #: Zero displacement, and no known load by position.
-BEGUN = only("placed", Copy(to="place.S"), *_STILL, Copy(to=D + "body.motion"))
+BEGUN = only("placed", Copy(to="place.S"), *_NO_POSE_CHANGE, Copy(to=D + "body.motion"))
 
 
 def _accumulate_rows(to: str, *steps: Step) -> tuple[Step, ...]:
@@ -46,7 +46,7 @@ def _accumulate_rows(to: str, *steps: Step) -> tuple[Step, ...]:
 
 def _along_position(entries: str, *steps: Step) -> tuple[Step, ...]:
     """Steps for entries of the body's position, whose seed is cleared afterwards."""
-    return (ForEachDirection(of=entries, steps=(_POSED, *steps)), *_STILL)
+    return (ForEachDirection(of=entries, steps=(_POSE_CHANGE, *steps)), *_NO_POSE_CHANGE)
 
 
 #: Drag by motion and modes is added to the body's own load.
@@ -64,19 +64,19 @@ OWN_BY_PLACE = only(
     ),
 )
 
-_APPLIED = next(
+_APPLIED_LOAD = next(
     step for step in LOADS.steps
     if isinstance(step, Call) and step.kernel == "frames.applied_load"
 )  # fmt: skip
 #: Steps that compute the inputs of its application.
-_LOAD_INPUTS = LOADS.steps[: LOADS.steps.index(_APPLIED)]
+_LOAD_INPUTS = LOADS.steps[: LOADS.steps.index(_APPLIED_LOAD)]
 
 LOADS_BY_PLACE = Pass(
     "loads_by_place", "load", "Change of a load in the axes of space as its body turns.",
     (
         *_LOAD_INPUTS,
         *_along_position(
-            "turn", *_accumulate_rows("place.S", differentiate_call(_APPLIED, "A_F", "F", "M"))
+            "turn", *_accumulate_rows("place.S", differentiate_call(_APPLIED_LOAD, "A_F", "F", "M"))
         ),
     ),
     skip="!own_load",
@@ -99,18 +99,18 @@ def _skip_ground_end(step: Step) -> Step:
     return step
 
 
-_FORCE = tuple(slopes(FORCES.steps))
-_FORCE_MOVED = tuple(map(_skip_ground_end, filter(_computes_derivative, _FORCE)))
+_FORCE_STEPS = tuple(slopes(FORCES.steps))
+_FORCE_DERIVATIVES = tuple(map(_skip_ground_end, filter(_computes_derivative, _FORCE_STEPS)))
 #: Zero derivatives of the end on the ground.
-_GROUNDED = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
+_GROUND_END = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
 
 FORCES_BY_PLACE = Pass(
     "forces_by_place", "force", "Change of an element to the ground as its body moves.",
     (
-        *(step for step in _FORCE if not _computes_derivative(step)),
-        *_GROUNDED,
-        *_along_position("place", *_accumulate_rows("place.S", *_FORCE_MOVED)),
-        ForEachDirection(of="spin", steps=_accumulate_rows("tangent.S", *_FORCE_MOVED)),
+        *(step for step in _FORCE_STEPS if not _computes_derivative(step)),
+        *_GROUND_END,
+        *_along_position("place", *_accumulate_rows("place.S", *_FORCE_DERIVATIVES)),
+        ForEachDirection(of="spin", steps=_accumulate_rows("tangent.S", *_FORCE_DERIVATIVES)),
     ),
     skip="!own_force",
 )  # fmt: skip
@@ -125,29 +125,29 @@ def column(b: str, d_v: str) -> Step:
                 v_P="body.v", v="hinge.v", d_v=d_v, Q="local.carrier", B_p=b)  # fmt: skip
 
 
-_SP = {"S_p": "place.S"}
+_ROW_PORTS = {"S_p": "place.S"}
 _ROWS = {"Z_p": "local.placed"}
 HINGE_ROWS = only(
     "moving placed",
-    call("tangent.placed_rows", n="free", H="tangent.H", **_SP, **_ROWS),
-    call("tangent.placed_own", n="free", B_p="place.B", **_SP, **_ROWS, K="tangent.G",
+    call("tangent.placed_rows", n="free", H="tangent.H", **_ROW_PORTS, **_ROWS),
+    call("tangent.placed_own", n="free", B_p="place.B", **_ROW_PORTS, **_ROWS, K="tangent.G",
          Z_x="tangent.W"),
 )  # fmt: skip
 HINGE_REDUCED = only(
     "moving placed",
     call("tangent.placed_reduce", n="free", inverse="tangent.inverse", **_ROWS, V="tangent.V",
-         gain="place.gain", **_SP),
+         gain="place.gain", **_ROW_PORTS),
 )  # fmt: skip
 MODES_OWN = only(
     "modal section placed",
-    call("tangent.placed_own", n="modes", B_p="bend.place_B", **_SP, Z_p="bend.place_Z",
+    call("tangent.placed_own", n="modes", B_p="bend.place_B", **_ROW_PORTS, Z_p="bend.place_Z",
          K="bend.K", Z_x="bend.Z_x"),
 )  # fmt: skip
 
 
 def _node(condition: str, subspace: str) -> Step:
     return call("tangent.placed_node", n="modes", when=condition, H=subspace, V="bend.V",
-                D="bend.D", **_SP, Z_p="bend.place_Z", right="bend.place_right",
+                D="bend.D", **_ROW_PORTS, Z_p="bend.place_Z", right="bend.place_right",
                 gain="bend.place_gain", S_c="local.S_p", work="bend.work")  # fmt: skip
 
 
@@ -156,18 +156,18 @@ MODES_REDUCED = (
     _node("modal !section placed", "bend.still"),
     *only("modal placed", Copy(to="place.S", source="local.S_p")),
 )
-_AT = {"Rc": "body.R", "r": "body.r"}
-CARRIED = call("frames.placed_carry", when="placed", **_AT, **_SP, T_p="local.T_p",
+_POSE_PORTS = {"Rc": "body.R", "r": "body.r"}
+CARRIED = call("frames.placed_carry", when="placed", **_POSE_PORTS, **_ROW_PORTS, T_p="local.T_p",
                T_w="local.T", S_pI="inboard.place", S_wI="inboard.S")  # fmt: skip
-ABSORBED = call("tangent.placed_absorb", n="modes", when="outward placed", **_AT, H="section.H",
-                B_p="port.place_B", **_SP, T_p="local.T_p", K="bend.K", Z_p="bend.place_Z",
-                Z_x="bend.Z_x")  # fmt: skip
+ABSORBED = call("tangent.placed_absorb", n="modes", when="outward placed", **_POSE_PORTS,
+                H="section.H", B_p="port.place_B", **_ROW_PORTS, T_p="local.T_p", K="bend.K",
+                Z_p="bend.place_Z", Z_x="bend.Z_x")  # fmt: skip
 
 # --- one right-hand side ------------------------------------------------------------------------
 
-KNOWN = call("frames.placed_known", when="placed", **_SP, b_p="place.known", e_S="local.seen",
-             e_b="local.known")  # fmt: skip
-MOVED = call("frames.placed_moved", when="placed", **_AT, z_I=D + "parent.motion",
+KNOWN = call("frames.placed_known", when="placed", **_ROW_PORTS, b_p="place.known",
+             e_S="local.seen", e_b="local.known")  # fmt: skip
+MOVED = call("frames.placed_moved", when="placed", **_POSE_PORTS, z_I=D + "parent.motion",
              p_I="inboard.z", p="place.z")  # fmt: skip
 KNOWN_MOVED = Add(to="place.z", source="place.known")
 

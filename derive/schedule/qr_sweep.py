@@ -24,7 +24,7 @@ QR_OWN = Pass(
 )  # fmt: skip
 
 _ROWS = {"U": "body.U", "d": "body.d", "e": "body.e"}
-_BEHIND = {"V": "local.V", "d_V": "local.d_V", "e_Q": "local.e_Q"}
+_REDUCED_PORTS = {"V": "local.V", "d_V": "local.d_V", "e_Q": "local.e_Q"}
 
 QR_CONDENSE = Pass(
     "qr_condense", "body", "Rows of a body, complete, carried across its hinge to the parent.",
@@ -33,8 +33,8 @@ QR_CONDENSE = Pass(
         FREE_EFFORTS,
         call("generic{free}.qr_eliminate", fails="undetermined", H="hinge.H_free",
              J="hinge.J_free", floor="body.floor", **_ROWS, tau="hinge.tau_free", G="hinge.G",
-             g="hinge.g", **_BEHIND),
-        call("qr.merge", when="hung", Rc="body.R", r="body.r", **_BEHIND, U_P="parent.U",
+             g="hinge.g", **_REDUCED_PORTS),
+        call("qr.merge", when="hung", Rc="body.R", r="body.r", **_REDUCED_PORTS, U_P="parent.U",
              d_P="parent.d", U="local.U", d="local.d", e_I="parent.e"),
         Copy(to="parent.U", source="local.U", when="hung"),
         Copy(to="parent.d", source="local.d", when="hung"),

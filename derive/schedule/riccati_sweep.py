@@ -20,8 +20,8 @@ from .pass_steps import (
 
 BODY = {"Rc": "body.R", "r": "body.r"}
 COORDINATES = {"p": "hinge.p", "q": "body.q"}
-_CARRIED = {"S": "local.S", "e": "local.e"}
-_ONWARD = {"S_I": "local.S", "e_I": "local.e"}
+_LOCAL_PORTS = {"S": "local.S", "e": "local.e"}
+_LOCAL_OUTPUTS = {"S_I": "local.S", "e_I": "local.e"}
 _NO_SPEEDS = {"H": "none", "J": "none", "floor": "zero", "tau": "none"}
 
 #: Columns of H, rotor inertia and efforts of the free speeds.
@@ -32,12 +32,12 @@ FREE = (
 FREE_EFFORTS = SelectColumns(to="hinge.tau_free", source="body.tau")
 
 
-def _transported(rotation: str, place: str) -> tuple[Step, ...]:
+def _transport_steps(rotation: str, place: str) -> tuple[Step, ...]:
     """S and e carried by the plain products; the kernel adds to the stored values."""
     return (
         Copy(to="local.S_I"),
         Copy(to="local.e_I"),
-        call("generic0.condense", Rc=rotation, r=place, **_NO_SPEEDS, **_CARRIED,
+        call("generic0.condense", Rc=rotation, r=place, **_NO_SPEEDS, **_LOCAL_PORTS,
              S_I="local.S_I", e_I="local.e_I"),
         Copy(to="local.S", source="local.S_I"),
         Copy(to="local.e", source="local.e_I"),
@@ -55,7 +55,7 @@ def transport(stage: str, place: str, when: str) -> Step:
     def screw(axis: str, turn: str, along: int) -> tuple[Step, ...]:
         return (
             call(f"screw.condense_{axis}", turn=f"{rotation}[{turn}]", d=f"{place}[{along}]",
-                 **_CARRIED, **_ONWARD),
+                 **_LOCAL_PORTS, **_LOCAL_OUTPUTS),
         )  # fmt: skip
 
     return ByScrew(
@@ -63,17 +63,17 @@ def transport(stage: str, place: str, when: str) -> Step:
         about_x=screw("x", "4 7", 0),
         about_z=screw("z", "0 3", 2),
         turning=(
-            call("screw.condense_turn_by_trace", Rc=rotation, **_CARRIED, **_ONWARD),
-            *_transported("identity", place),
+            call("screw.condense_turn_by_trace", Rc=rotation, **_LOCAL_PORTS, **_LOCAL_OUTPUTS),
+            *_transport_steps("identity", place),
         ),
-        otherwise=_transported(rotation, place),
+        otherwise=_transport_steps(rotation, place),
     )  # fmt: skip
 
 
 #: Elimination separate from the transport.  After a screw about z that leaves H unchanged, it is
 #: done in inboard axes, which removes the rotation from the chain of divisions.
-_ELIMINATED = {
-    **_CARRIED, "F": "hinge.F", "Z": "hinge.Z", "W": "hinge.W", "S_Q": "local.S",
+_ELIMINATION_PORTS = {
+    **_LOCAL_PORTS, "F": "hinge.F", "Z": "hinge.Z", "W": "hinge.W", "S_Q": "local.S",
     "e_Q": "local.e", "D_ii": "local.pivots",
 }  # fmt: skip
 
@@ -89,7 +89,7 @@ def condensed(load: str) -> tuple[Step, ...]:
 
 def eliminate_with_effort(effort: str, offset: str) -> tuple[Step, ...]:
     """S and a load after elimination of the hinge's free speeds, on which an effort acts."""
-    ports = {**_ELIMINATED, "tau": effort, "z": offset}
+    ports = {**_ELIMINATION_PORTS, "tau": effort, "z": offset}
     return (
         call("hinge.eliminate", when="free special", fails="undetermined", **COORDINATES, **ports),
         call("generic{free}.eliminate", when="free !special", fails="undetermined",
@@ -110,7 +110,7 @@ HANDED_ON = (
     Add(to="parent.S", source="local.S", when="hung"),
     Add(to="parent.e", source="local.e", when="hung"),
 )
-_BY_STAGES = only(
+_STAGED_STEPS = only(
     "staged",
     *condensed("body.e"),
     *eliminate_with_effort("hinge.tau_free", "hinge.z"),
@@ -120,8 +120,8 @@ _BY_STAGES = only(
 )
 
 _GAINS = {"G": "hinge.G", "g": "hinge.g"}
-_OWN = {"floor": "body.floor", "S": "body.S", "e": "body.e"}
-_PARENT = {"S_I": "parent.S", "e_I": "parent.e"}
+_BODY_PORTS = {"floor": "body.floor", "S": "body.S", "e": "body.e"}
+_PARENT_PORTS = {"S_I": "parent.S", "e_I": "parent.e"}
 
 CONDENSE = Pass(
     "condense", "body", "S and e of a body, complete, carried across its hinge to the parent.",
@@ -129,31 +129,31 @@ CONDENSE = Pass(
         RunPass(whole=MODAL_CONDENSE, when="modal"),
         *only("outward", ABSORBED),
         *only("parts", *FREE, FREE_EFFORTS),
-        call("hinge.condense", when="own", fails="undetermined", **BODY, **COORDINATES, **_OWN,
-             tau="body.tau", **_GAINS, **_PARENT),
+        call("hinge.condense", when="own", fails="undetermined", **BODY, **COORDINATES,
+             **_BODY_PORTS, tau="body.tau", **_GAINS, **_PARENT_PORTS),
         call("generic{free}.condense", when="parts !staged", fails="undetermined", **BODY,
-             H="hinge.H_free", J="hinge.J_free", **_OWN, tau="hinge.tau_free", **_GAINS,
-             **_PARENT),
-        *_BY_STAGES,
+             H="hinge.H_free", J="hinge.J_free", **_BODY_PORTS, tau="hinge.tau_free", **_GAINS,
+             **_PARENT_PORTS),
+        *_STAGED_STEPS,
     ),
     order=TIPS_TO_ROOT, skip="idle",
 )  # fmt: skip
 
 _FACTORED = {"H": "hinge.H_free", "F": "hinge.F", "Z": "hinge.Z", "z": "hinge.z", "W": "hinge.W"}
 _RATES = {"udot": "hinge.rates"}
-_STILL = {"H": "none", "G": "none", "g": "none"}
+_NO_GAINS = {"H": "none", "G": "none", "g": "none"}
 
 #: After `eliminate_with_effort`, stage by stage.
 RECOVERED = (
-    call("generic0.recover", Rc="connection.R", r="connection.r", **_STILL,
+    call("generic0.recover", Rc="connection.R", r="connection.r", **_NO_GAINS,
          delta_I="parent.delta", delta="local.delta"),
     call("generic{free}.recover_factored", when="free axial", Rc="identity", r="zero",
          **_FACTORED, delta_I="local.delta", **_RATES, delta="local.delta"),
-    call("generic0.recover", when="free axial", Rc="hinge.R", r="hinge.d", **_STILL,
+    call("generic0.recover", when="free axial", Rc="hinge.R", r="hinge.d", **_NO_GAINS,
          delta_I="local.delta", delta="body.delta"),
     call("generic{free}.recover_factored", when="free !axial", Rc="hinge.R", r="hinge.d",
          **_FACTORED, delta_I="local.delta", **_RATES, delta="body.delta"),
-    call("generic0.recover", when="!free", Rc="hinge.R", r="hinge.d", **_STILL,
+    call("generic0.recover", when="!free", Rc="hinge.R", r="hinge.d", **_NO_GAINS,
          delta_I="local.delta", delta="body.delta"),
 )  # fmt: skip
 

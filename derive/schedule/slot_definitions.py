@@ -121,7 +121,7 @@ H | 6 n | motion subspace of the modes
 push | 6 n | S H of the bodies outboard of the section
 end | 9 | axes of the end in the section
 """
-_OTHERS = """
+_OTHER_SLOTS = """
 link.b | 11 | numbers of the rigid body, and the rotor inertia of its hinge
 link.p | 1 | number of the hinge
 link.numbers | 5 | screws about x and z from link to link; rotation and place (12) of a ball
@@ -313,7 +313,7 @@ SLOTS: dict[str, Slot] = {
     slot.name: slot
     for slot in (
         *_rows("body", _BODY), *_rows("hinge", _HINGE), *_rows("connection", _CONNECTION),
-        *_rows("modes", _MODES), *_rows("section", _SECTION), *_rows("", _OTHERS),
+        *_rows("modes", _MODES), *_rows("section", _SECTION), *_rows("", _OTHER_SLOTS),
     )
 }  # fmt: skip
 

@@ -38,21 +38,23 @@ from .tangent_sweep import (
     TANGENT_SOLUTION,
 )
 
-_GIVEN = (
+_GIVEN_RUNS = (
     Run(whole=PRESCRIBED),
     Run(hook="drive_values", when="driven"),
     Run(whole=DRIVES, when="driven"),
     Run(hook="expression_values", when="valued"),
 )
-GIVEN = Sweep("given", "Driven coordinates, and the values of the scene's expressions.", _GIVEN)
-_APPLIED = (
+GIVEN = Sweep(
+    "given", "Driven coordinates, and the values of the scene's expressions.", _GIVEN_RUNS
+)
+_LOAD_RUNS = (
     Run(whole=DRAG, when="posed flexible"),
     Run(whole=LOADS, when="posed"),
     Run(whole=FORCES, when="posed"),
 )
 
 #: Closing of rows and computation of multipliers, in place of `condense` and `recover`.
-_CLOSED = (
+_CLOSURE_RUNS = (
     Run(hook="rows_begun"),
     Run(whole=CLOSURES),
     Run(hook="rows_asked"),
@@ -67,7 +69,7 @@ _CLOSED = (
 ACCELERATIONS = Sweep(
     "accelerations", "Rates of the coordinates and accelerations.",
     (
-        *_GIVEN,
+        *_GIVEN_RUNS,
         Run(hook="links_forward", when="linked"),
         Run(whole=FORWARD, when="!linked"),
         Run(whole=QR_OWN, when="qr"),
@@ -79,14 +81,14 @@ ACCELERATIONS = Sweep(
         Run(whole=STRAIN, when="balance flexible"),
         Run(whole=POSES, when="posed"),
         Run(hook="product_before_loads", when="product"),
-        *_APPLIED,
+        *_LOAD_RUNS,
         Run(hook="product", when="product"),
         Run(hook="links_condense", when="linked"),
         Run(hook="links_recover", when="linked"),
         Run(whole=CONDENSE, when="!linked !qr !looped"),
         Run(whole=QR_CONDENSE, when="qr"),
         Run(whole=RECOVER, when="!linked !looped"),
-        *(replace(run, when="looped") for run in _CLOSED),
+        *(replace(run, when="looped") for run in _CLOSURE_RUNS),
         Run(whole=DRIVE_POWER, when="balance"),
         Run(whole=COUPLINGS_ANSWERED, when="couplings"),
         Run(hook="product_compared", when="product"),
@@ -99,13 +101,13 @@ ACCELERATIONS_IN_PLANE = sweep_in_plane(ACCELERATIONS)
 INVERSE_DYNAMICS = Sweep(
     "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",
     (
-        *_GIVEN,
+        *_GIVEN_RUNS,
         Run(whole=FORWARD),
         Run(whole=EFFORTS),
         Run(whole=LAWS),
         Run(whole=STRAIN, when="balance flexible"),
         Run(whole=POSES, when="posed"),
-        *_APPLIED,
+        *_LOAD_RUNS,
         Run(hook="couplings_valued", when="couplings residual"),
         Run(whole=COUPLINGS_LOADED, when="couplings residual"),
         Run(whole=CLOSURES_LOADED, when="looped residual"),
@@ -127,13 +129,13 @@ CORRECTION = Sweep(
         Run(hook="struck"),
         Run(whole=CONDENSE, when="!looped"),
         Run(whole=RECOVER, when="!looped"),
-        *(replace(run, when="looped") for run in _CLOSED),
+        *(replace(run, when="looped") for run in _CLOSURE_RUNS),
     ),
 )
 
 MOTION = Sweep(
     "motion", "Poses and velocities of all bodies.",
-    (*_GIVEN, Run(whole=FORWARD), Run(whole=POSES)),
+    (*_GIVEN_RUNS, Run(whole=FORWARD), Run(whole=POSES)),
 )  # fmt: skip
 POSED = Sweep("posed", "Poses alone, behind a sweep.", (Run(whole=POSES),))
 

@@ -62,16 +62,16 @@ _HINGE_MOTION = Pass(
 #: Its derivative, also used by other sweeps.
 HINGE_CHANGE = differentiate_pass(_HINGE_MOTION)
 #: The same where later steps do not read it.
-_CHANGED = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
-_CHANGE = elsewhere(HINGE_CHANGE, "", _CHANGED).steps
-_ACROSS = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
-               motion_I="parent.motion", **BODY)  # fmt: skip
+_LOCAL_CHANGE_SLOTS = {f"hinge.{name}": f"local.hinge_{name}" for name in HINGE}
+_LOCAL_CHANGE_STEPS = elsewhere(HINGE_CHANGE, "", _LOCAL_CHANGE_SLOTS).steps
+_FORWARD_CALL = call("generic{nu}.forward", **CONNECTION, **HINGE, s="body.s",
+                     motion_I="parent.motion", **BODY)  # fmt: skip
 _FORWARD = Pass(
     FORWARD.name, "body", FORWARD.purpose,
     (
         RunPass(whole=SECTION_MOTION, when="section"),
         RunPass(whole=_HINGE_MOTION, when="!section"),
-        _ACROSS,
+        _FORWARD_CALL,
         RunPass(whole=MODAL_OWN, when="modal"),
         call("body.bias_load", when="!modal", p="body.p", motion="body.motion", e="body.e"),
     ),
@@ -85,34 +85,34 @@ def _skip_hinge_motion(whole: Pass) -> Pass:
     return replace(whole, steps=tuple(steps))
 
 
-_MOVED_ALONG = (
+_MOTION_RUNS = (
     Run(whole=differentiate_pass(PRESCRIBED)),
     Run(hook="drive_slopes", when="driven"),
     Run(whole=differentiate_pass(DRIVES), when="driven"),
     Run(hook="expression_slopes", when="valued"),
     Run(whole=differentiate_pass(_FORWARD)),
 )
-_POSED = Run(whole=differentiate_pass(_skip_hinge_motion(POSES)), when="posed")
-_ACTING = (
+_POSE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(POSES)), when="posed")
+_LOAD_RUNS = (
     Run(whole=differentiate_pass(DRAG), when="posed flexible"),
     Run(whole=differentiate_pass(LOADS), when="posed"),
     Run(whole=differentiate_pass(FORCES), when="posed"),
 )
-_COUPLED = (
+_COUPLING_RUNS = (
     Run(hook="coupling_slopes", when="couplings"),
     Run(whole=differentiate_pass(COUPLINGS_LOADED), when="couplings"),
 )
-_CLOSED = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURES_LOADED)), when="looped")
+_CLOSURE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURES_LOADED)), when="looped")
 DIRECTIONAL = Sweep(
     "required_slope", "Derivative of the efforts that given accelerations need.",
     (
-        *_MOVED_ALONG,
+        *_MOTION_RUNS,
         Run(whole=differentiate_pass(EFFORTS)),
         Run(whole=differentiate_pass(LAWS)),
-        *_COUPLED,
-        _POSED,
-        *_ACTING,
-        _CLOSED,
+        *_COUPLING_RUNS,
+        _POSE_RUN,
+        *_LOAD_RUNS,
+        _CLOSURE_RUN,
         Run(whole=differentiate_pass(_skip_hinge_motion(REQUIRED))),
     ),
 )  # fmt: skip
@@ -135,18 +135,18 @@ APPLIED_SLOPE = Sweep(
     "applied_slope",
     "Derivative of what acts across the tree, and of the values of expressions.",
     (
-        *_MOVED_ALONG,
-        _POSED,
+        *_MOTION_RUNS,
+        _POSE_RUN,
         Run(whole=_NO_LOADS, when="posed"),
         _across_tree(LOADS, "own_load"),
         _across_tree(FORCES, "own_force"),
         Run(whole=differentiate_pass(EFFORTS), when="looped"),
-        *_COUPLED,
+        *_COUPLING_RUNS,
         # Within the tree they are part of the elimination.
         Run(
             whole=replace(differentiate_pass(LAWS), name="laws_across", skip="!shut"), when="looped"
         ),
-        _CLOSED,
+        _CLOSURE_RUN,
     ),
 )
 
@@ -155,50 +155,61 @@ APPLIED_SLOPE = Sweep(
 
 
 #: Outputs formed from derivatives of a hinge or section, and their further inputs.
-_ACROSS_NOW = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
-_CARRIER = call("generic{nu}.tangent_carrier", **_ACROSS_NOW, s="body.s", c="hinge.c",
+_MOTION_PORTS = {"H": "hinge.H", "v": "hinge.v", "w": "hinge.w"}
+_CARRIER = call("generic{nu}.tangent_carrier", **_MOTION_PORTS, s="body.s", c="hinge.c",
                 motion="body.motion", Q="local.carrier")  # fmt: skip
-_TURNED = {"theta": "local.turn", "x": "local.shift"}
+_DISPLACEMENT_PORTS = {"theta": "local.turn", "x": "local.shift"}
 
 
-def _turn(change: Callable[[str], str]) -> Call:
-    return call("frames.tangent_turned", R="hinge.R", d_R=change("R"), d_d=change("d"), **_TURNED)
-
-
-def _column(b: str, g: str, laws: str) -> dict[str, str]:
-    """Slots of a direction's rows of B and G, and of the change of the hinge's rows."""
-    return {
-        **_TURNED, **_ACROSS_NOW, "Q": "local.carrier", "f": "body.e", "d_s": D + "body.given",
-        "J": "body.rotor", "laws": laws, "B": b, "G": g, "row": "local.change",
-    }  # fmt: skip
-
-
-def _of_section(name: str) -> str:
-    return f"{D}hinge.{name}"
-
-
-def _of_hinge(name: str) -> str:
-    return D + _CHANGED[f"hinge.{name}"]
-
-
-def _changes(change: Callable[[str], str]) -> dict[str, str]:
-    return {"s": "body.s"} | {f"d_{name}": change(name) for name in ("H", "v", "w", "c")}
-
-
-def _along_modes(b: str, g: str, b_p: str) -> tuple[Step, ...]:
-    """B, G and B_p along modes from derivatives of a section and, in d:modes.felt, of rows."""
-    felt = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
-                tau="modes.felt")  # fmt: skip
-    return (
-        RunPass(whole=differentiate_pass(SECTION_MOTION)),
-        _turn(_of_section),
-        call("generic{nu}.tangent_column", **_column(b, g, "none"), **_changes(_of_section)),
-        position_dependent_loads.column(b_p, _of_section("v")),
-        differentiate_call(felt, "e"),
+def _displacement_call(change: Callable[[str], str]) -> Call:
+    return call(
+        "frames.tangent_turned",
+        R="hinge.R",
+        d_R=change("R"),
+        d_d=change("d"),
+        **_DISPLACEMENT_PORTS,
     )
 
 
-def _section(matrices: str) -> tuple[Step, ...]:
+def _column_ports(b: str, g: str, laws: str) -> dict[str, str]:
+    """Slots of a direction's rows of B and G, and of the change of the hinge's rows."""
+    return {
+        **_DISPLACEMENT_PORTS, **_MOTION_PORTS, "Q": "local.carrier", "f": "body.e",
+        "d_s": D + "body.given", "J": "body.rotor", "laws": laws, "B": b, "G": g,
+        "row": "local.change",
+    }  # fmt: skip
+
+
+def _section_slot(name: str) -> str:
+    return f"{D}hinge.{name}"
+
+
+def _hinge_slot(name: str) -> str:
+    return D + _LOCAL_CHANGE_SLOTS[f"hinge.{name}"]
+
+
+def _change_ports(change: Callable[[str], str]) -> dict[str, str]:
+    return {"s": "body.s"} | {f"d_{name}": change(name) for name in ("H", "v", "w", "c")}
+
+
+def _mode_steps(b: str, g: str, b_p: str) -> tuple[Step, ...]:
+    """B, G and B_p along modes from derivatives of a section and, in d:modes.felt, of rows."""
+    effort = call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f",
+                  tau="modes.felt")  # fmt: skip
+    return (
+        RunPass(whole=differentiate_pass(SECTION_MOTION)),
+        _displacement_call(_section_slot),
+        call(
+            "generic{nu}.tangent_column",
+            **_column_ports(b, g, "none"),
+            **_change_ports(_section_slot),
+        ),
+        position_dependent_loads.column(b_p, _section_slot("v")),
+        differentiate_call(effort, "e"),
+    )
+
+
+def _section_steps(matrices: str) -> tuple[Step, ...]:
     """Steps of a section, which has no speeds: its rows are those of the modes."""
     return (
         _CARRIER,
@@ -206,7 +217,7 @@ def _section(matrices: str) -> tuple[Step, ...]:
             of="modes",
             steps=(
                 Copy(to=D + "modes.e_f"),
-                *_along_modes(
+                *_mode_steps(
                     f"{matrices}.B[9 * c]", f"{matrices}.G[6 * c]", f"{matrices}.place_B[9 * c]"
                 ),
                 Move(to=f"{matrices}.W[n * c]", source=D + "modes.felt", count="n"),
@@ -215,21 +226,21 @@ def _section(matrices: str) -> tuple[Step, ...]:
     )
 
 
-def _along_hinge(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
+def _hinge_steps(b: str, g: str, b_p: str, laws: str) -> tuple[Step, ...]:
     """B, G and B_p along a hinge's unknown, from its derivatives; its rows in local.change."""
-    column = _column(b, g, laws)
+    column = _column_ports(b, g, laws)
     turning = {port: slot for port, slot in column.items() if port not in ("x", "v")}
     return (
-        *only("!steady", *_CHANGE),
-        *only("steady curved", *_CHANGE),
-        *only("steady !curved placed", *_CHANGE),
+        *only("!steady", *_LOCAL_CHANGE_STEPS),
+        *only("steady curved", *_LOCAL_CHANGE_STEPS),
+        *only("steady !curved placed", *_LOCAL_CHANGE_STEPS),
         call("generic{nu}.tangent_along", when="!curved", H="hinge.H", d_q=D + "body.q",
-             **_TURNED),
-        replace(_turn(_of_hinge), when="curved"),
+             **_DISPLACEMENT_PORTS),
+        replace(_displacement_call(_hinge_slot), when="curved"),
         call("generic{nu}.tangent_turning", when="turning", **turning, d_u=D + "body.u"),
         call("generic{nu}.tangent_steady", when="steady !turning", **column, d_u=D + "body.u"),
-        call("generic{nu}.tangent_column", when="!steady", **column, **_changes(_of_hinge)),
-        position_dependent_loads.column(b_p, _of_hinge("v")),
+        call("generic{nu}.tangent_column", when="!steady", **column, **_change_ports(_hinge_slot)),
+        position_dependent_loads.column(b_p, _hinge_slot("v")),
     )  # fmt: skip
 
 
@@ -243,7 +254,7 @@ _HINGE = (
         ForEachDirection(
             of="free",
             steps=(
-                *_along_hinge(
+                *_hinge_steps(
                     "tangent.B[9 * c]", "tangent.G[6 * c]", "place.B[9 * c]",
                     "tangent.laws[nu * c]",
                 ),
@@ -351,15 +362,15 @@ _NODE = {
     **_OWN, "S": "tangent.S", "S_c": "local.S_c",
 }  # fmt: skip
 _ROWS = {"K": "local.K", "right": "local.right"}
-_TH = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
+_CARRY_PORTS = {"Rc": "body.R", "r": "body.r", "w_I": "parent.w", "v": "hinge.v", "w": "hinge.w"}
 
 #: Contribution of a body, linear in its unknowns, before elimination.
 _COLUMNS = (
-    *only("modal section", *_section("bend")),
+    *only("modal section", *_section_steps("bend")),
     *only("moving", *_HINGE),
-    *only("outward", *_section("port")),
+    *only("outward", *_section_steps("port")),
 )
-_ELIMINATED = (
+_ELIMINATION_STEPS = (
     *position_dependent_loads.MODES_OWN,
     call("tangent.node", n="modes", when="modal section", fails="tangent", H="section.H",
          **_NODE),
@@ -378,7 +389,7 @@ _ELIMINATED = (
              G="tangent.G", gain="tangent.gain", V="tangent.V", S="tangent.S"),
     ),
     *position_dependent_loads.HINGE_REDUCED,
-    call("frames.tangent_carry", **_TH, S="tangent.S", T="local.T", S_I="inboard.S"),
+    call("frames.tangent_carry", **_CARRY_PORTS, S="tangent.S", T="local.T", S_I="inboard.S"),
     position_dependent_loads.CARRIED,
     call("tangent.absorb", n="modes", when="outward", Rc="body.R", r="body.r", H="section.H",
          B="port.B", G="port.G", W="port.W", S="tangent.S", T="local.T", K_x="port.K", **_OWN),
@@ -387,7 +398,7 @@ _ELIMINATED = (
 
 TANGENT_CONDENSE = Pass(
     "tangent_condense", "body", "Unknowns of a body eliminated, the rest carried to the parent.",
-    (*_COLUMNS, *_ELIMINATED),
+    (*_COLUMNS, *_ELIMINATION_STEPS),
     order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
@@ -397,10 +408,10 @@ TANGENT_BROUGHT = Pass(
 )
 TANGENT_ELIMINATED = replace(
     TANGENT_CONDENSE, name="tangent_eliminated",
-    purpose="Unknowns of a body eliminated, of what it brings.", steps=_ELIMINATED,
+    purpose="Unknowns of a body eliminated, of what it brings.", steps=_ELIMINATION_STEPS,
 )  # fmt: skip
 
-_BROUGHT = (
+_CONTRIBUTION_RUNS = (
     Run(whole=TANGENT_OWN),
     Run(whole=LAW_SLOPES),
     Run(whole=position_dependent_loads.LOADS_BY_PLACE, when="posed"),
@@ -409,18 +420,18 @@ _BROUGHT = (
 TANGENT = Sweep(
     "tangent",
     "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
-    (*_BROUGHT, Run(whole=TANGENT_CONDENSE)),
+    (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_CONDENSE)),
 )
 BROUGHT = Sweep(
     "tangent_brought",
     "What the tangent is eliminated from, behind inverse dynamics.",
-    (*_BROUGHT, Run(whole=TANGENT_BROUGHT)),
+    (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_BROUGHT)),
 )
 
 
 # --- one right-hand side ------------------------------------------------------------------------
 
-_FELT_CHANGE = (
+_MODAL_EFFORT_CHANGE = (
     call("modal.modal_effort", H="section.H", e=D + "body.e", e_f=D + "modes.e_f",
          tau=D + "modes.felt"),
     Copy(to=D + "modes.e_f", source=D + "modes.felt"),
@@ -440,7 +451,7 @@ TANGENT_COLUMN = Pass(
 )  # fmt: skip
 
 
-def _pushed(subspace: str) -> tuple[Step, ...]:
+def _modal_push_steps(subspace: str) -> tuple[Step, ...]:
     return (
         call("tangent.push", n="modes", H=subspace, V="bend.V", D="bend.D", e=D + "body.e",
              e_f=D + "modes.e_f", rest="bend.rest", y="bend.y", e_c="local.e_c",
@@ -449,51 +460,56 @@ def _pushed(subspace: str) -> tuple[Step, ...]:
     )  # fmt: skip
 
 
-_PUSH = {
+_PUSH_PORTS = {
     "Rc": "body.R", "r": "body.r", "H": "tangent.H", "V": "tangent.V",
     "inverse": "tangent.inverse", "e": D + "body.e", "e_f": "local.rows", "y": "tangent.y",
     "e_I": D + "parent.e",
 }  # fmt: skip
-_STILL = call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
-              e_I=D + "parent.e")  # fmt: skip
+_LOAD_TRANSPORT = call("frames.transport", when="!moving", Rc="body.R", r="body.r", e=D + "body.e",
+                       e_I=D + "parent.e")  # fmt: skip
 
 TANGENT_CARRIED = Pass(
     "tangent_carried", "body", "Loads of a right-hand side carried to the parent.",
     (
-        *only("modal section", *_pushed("section.H")),
-        *only("modal !section", *_pushed("bend.still")),
-        *only("outward", *_FELT_CHANGE),
+        *only("modal section", *_modal_push_steps("section.H")),
+        *only("modal !section", *_modal_push_steps("bend.still")),
+        *only("outward", *_MODAL_EFFORT_CHANGE),
         *only(
             "moving",
             SelectColumns(to="local.rows", source=D + "body.tau"),
-            call("generic{free}.tangent_push", **_PUSH),
+            call("generic{free}.tangent_push", **_PUSH_PORTS),
         ),
-        _STILL,
+        _LOAD_TRANSPORT,
     ),
     order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
 
-_MOVED = Copy(to=D + "body.motion", source="local.z")
-_BEHIND = _TH | {"z_I": D + "parent.motion", "z": D + "body.motion"}
-_ANSWER = _BEHIND | {"B": "tangent.B", "gain": "tangent.gain", "y": "tangent.y", "x": "local.x"}
-_SPREAD = ScatterSpeeds(to="body.answer", free="local.x")
+_STORE_MOTION = Copy(to=D + "body.motion", source="local.z")
+_MOVED_PORTS = _CARRY_PORTS | {"z_I": D + "parent.motion", "z": D + "body.motion"}
+_ANSWER_PORTS = _MOVED_PORTS | {
+    "B": "tangent.B",
+    "gain": "tangent.gain",
+    "y": "tangent.y",
+    "x": "local.x",
+}
+_STORE_ANSWER = ScatterSpeeds(to="body.answer", free="local.x")
 
 
-def _behind_modes(*known: Step) -> tuple[Step, ...]:
+def _motion_with_modes(*known_steps: Step) -> tuple[Step, ...]:
     """Motion outboard of a body's own modes, or of those of the body that it is an end of."""
     return (
-        call("frames.tangent_moved", when="!moving", **_BEHIND),
-        *known,
+        call("frames.tangent_moved", when="!moving", **_MOVED_PORTS),
+        *known_steps,
         call("tangent.displaced", n="modes", when="outward", B="port.B", x="modes.answer",
              z_c=D + "body.motion", z="local.z"),
-        *only("outward", _MOVED),
+        *only("outward", _STORE_MOTION),
         *position_dependent_loads.PORT_DISPLACED,
         *position_dependent_loads.MODES_LEFT,
         *only(
             "modal",
             call("tangent.answer", n="modes", B="bend.B", gain="bend.gain", y="bend.y",
                  z_c=D + "body.motion", x="modes.answer", z="local.z"),
-            _MOVED,
+            _STORE_MOTION,
         ),
         *position_dependent_loads.MODES_DISPLACED,
     )  # fmt: skip
@@ -505,9 +521,9 @@ TANGENT_ANSWERED = Pass(
         Copy(to="body.answer"),
         position_dependent_loads.MOVED,
         *position_dependent_loads.HINGE_LEFT,
-        *only("moving", call("generic{free}.tangent_answer", **_ANSWER), _SPREAD),
+        *only("moving", call("generic{free}.tangent_answer", **_ANSWER_PORTS), _STORE_ANSWER),
         *position_dependent_loads.HINGE_DISPLACED,
-        *_behind_modes(),
+        *_motion_with_modes(),
     ),
     skip="aside",
 )  # fmt: skip
@@ -552,7 +568,7 @@ KNOWN_LAWS = Pass(
 _KNOWN = call("frames.tangent_known", S="tangent.S", b="tangent.known", g="local.turned",
               e_S="local.seen", e_b="local.known")  # fmt: skip
 _KNOWN_ROWS = (
-    *_along_modes("tangent.known", "local.turned", "place.known"),
+    *_mode_steps("tangent.known", "local.turned", "place.known"),
     Copy(to=D + "modes.e_f", source=D + "modes.felt"),
 )
 _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
@@ -563,22 +579,22 @@ KNOWN_CARRIED = Pass(
     "known_carried", "body", "The same loads carried to the parent, with what is known.",
     (
         *only("section", _CARRIER, *_KNOWN_ROWS),
-        *only("modal section", *_pushed("section.H")),
-        *only("modal !section", *_pushed("bend.still")),
+        *only("modal section", *_modal_push_steps("section.H")),
+        *only("modal !section", *_modal_push_steps("bend.still")),
         *only("section", _KNOWN, position_dependent_loads.KNOWN),
-        *only("outward", Add(to=D + "body.e", source="local.seen"), *_FELT_CHANGE,
+        *only("outward", Add(to=D + "body.e", source="local.seen"), *_MODAL_EFFORT_CHANGE,
               Add(to=D + "body.e", source="local.turned")),
         *only("modal section", _KNOWN_LOAD),
         *only(
             "moving",
             _CARRIER,
-            *_along_hinge("tangent.known", "local.turned", "place.known", D + "body.tau"),
+            *_hinge_steps("tangent.known", "local.turned", "place.known", D + "body.tau"),
             SelectColumns(to="local.rows", source="local.change"),
             _KNOWN,
             position_dependent_loads.KNOWN,
-            call("generic{free}.tangent_push_known", **_PUSH, e_b="local.known"),
+            call("generic{free}.tangent_push_known", **_PUSH_PORTS, e_b="local.known"),
         ),
-        _STILL,
+        _LOAD_TRANSPORT,
     ),
     order=TIPS_TO_ROOT, skip="aside",
 )  # fmt: skip
@@ -590,10 +606,11 @@ KNOWN_ANSWERED = Pass(
         position_dependent_loads.MOVED,
         *only("moving placed", position_dependent_loads.KNOWN_MOVED),
         *position_dependent_loads.HINGE_LEFT,
-        *only("moving", call("generic{free}.tangent_answer_known", **_ANSWER, b="tangent.known"),
-              _SPREAD),
+        *only("moving",
+              call("generic{free}.tangent_answer_known", **_ANSWER_PORTS, b="tangent.known"),
+              _STORE_ANSWER),
         *position_dependent_loads.HINGE_DISPLACED,
-        *_behind_modes(
+        *_motion_with_modes(
             Add(to=D + "body.motion", source="tangent.known", when="section"),
             *only("section placed", position_dependent_loads.KNOWN_MOVED),
         ),
