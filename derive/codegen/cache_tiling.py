@@ -163,7 +163,7 @@ def _tiled_run(runs_before: list[Run], last: Run, swept: Pass) -> TiledRun:
 
 
 def _is_local_run(run: Run) -> bool:
-    """Whether a pass reads and writes numbers of its own body and no other."""
+    """Whether a pass reads and writes only numbers of its own body."""
     sweep_pass = run.whole
     if (
         sweep_pass is None

@@ -1,4 +1,4 @@
-"""C text of the tangent's elimination in complex arithmetic, from the same kernels and passes.
+"""C text of the tangent's elimination in complex arithmetic, from the real kernels.
 
 A number there is one of several frequencies at a time (runtime/engine/c/complex_lanes.h).  Under
 harmonic loads the unknowns are complex amplitudes.  Contributions of bodies are linear in s^2, s

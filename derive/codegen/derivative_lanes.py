@@ -1,4 +1,4 @@
-"""Tangent kernels of the accelerations as C: the derivatives of one state, directions in lanes."""
+"""Tangent kernels of the accelerations as C: one state, directions in lanes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ typedef double real;
 def derivative_sources(kernels: Sequence[KernelIR], key: str) -> dict[str, str]:
     """File name -> C text of a library of derivatives that carries `key`.
 
-    Every kernel takes the inputs of "accelerations" and one direction behind them, and has one
+    Every kernel takes the inputs of "accelerations" followed by one direction, and has one
     output and no guards (`mstmm.ir.differentiation.differentiate` of one port and one output).
     """
     sizes = {port.name: port.length() for port in kernels[0].inputs[:6]}

@@ -111,9 +111,9 @@ class FunctionParts:
         return [
             f"{dialect.real} {_VALUES_NAME}[{widths[0]}];",
             f"{dialect.truth} {_TRUTHS_NAME}[{widths[1]}];",
-            *self._kept(self._head),
-            *(f"{self._part(k)}({arguments});" for k in range(1, self._count + 1)),
-            *self._recalled(self._in_the_end),
+            *self._store_lines(self._head),
+            *(f"{self._part_name(k)}({arguments});" for k in range(1, self._count + 1)),
+            *self._load_lines(self._in_the_end),
         ]
 
     def _arguments(self) -> list[str]:
@@ -121,7 +121,7 @@ class FunctionParts:
         ports = [port_array_name(port.name) for port in (*kernel.inputs, *kernel.outputs)]
         return [*ports, _VALUES_NAME, _TRUTHS_NAME, *([GUARDS_NAME] * self._guards.counted)]
 
-    def _part(self, k: int) -> str:
+    def _part_name(self, k: int) -> str:
         return f"{self._name}_part{k}"
 
     def _function(self, k: int, part: Sequence[Line]) -> str:
@@ -133,11 +133,11 @@ class FunctionParts:
                 foreign_numbers = {
                     n: None for n in temporaries_read(statement) if self._values.made[n] != k
                 }
-                lines += self._recalled(n for n in foreign_numbers if n not in loaded)
+                lines += self._load_lines(n for n in foreign_numbers if n not in loaded)
                 loaded.update(foreign_numbers)
             lines += statement_text(text, statement, self._guards)
             if isinstance(statement, Assign):
-                lines += self._kept([statement.number])
+                lines += self._store_lines([statement.number])
         parameters = [
             *parameter_list(text.kernel, dialect), f"{dialect.real} *restrict {_VALUES_NAME}",
             f"{dialect.truth} *restrict {_TRUTHS_NAME}",
@@ -147,10 +147,10 @@ class FunctionParts:
             "\n".join(f"    {line}" for line in lines),
             ",\n    ".join(parameters),
         )
-        head = f"static __attribute__((noinline)) void {self._part(k)}(\n    {parameter_text})"
+        head = f"static __attribute__((noinline)) void {self._part_name(k)}(\n    {parameter_text})"
         return f"{head}\n{{\n{body}\n}}\n"
 
-    def _kept(self, numbers: Iterable[int]) -> list[str]:
+    def _store_lines(self, numbers: Iterable[int]) -> list[str]:
         """C lines that store the temporaries that other parts read."""
         lines = []
         for number in numbers:
@@ -160,7 +160,7 @@ class FunctionParts:
                 lines.append(f"{_TRUTHS_NAME}[{self._truths.places[number]}] = m{number};")
         return lines
 
-    def _recalled(self, numbers: Iterable[int]) -> list[str]:
+    def _load_lines(self, numbers: Iterable[int]) -> list[str]:
         """C lines that load temporaries of other parts, under the same names."""
         text, lines = self._text, []
         for number in numbers:

@@ -43,7 +43,7 @@ class Guards:
     def verdict(self) -> list[str]:
         """Lines after the last guard, which return the function's result."""
         if self.in_lanes:
-            return self._of_lanes()
+            return self._lane_lines()
         if not self._found:
             return ["return 0;"]
         guard_codes = [code for _, code in self._found]
@@ -54,7 +54,7 @@ class Guards:
             f"return codes[{GUARDS_NAME}[1] + {GUARDS_NAME}[0]];",
         ]
 
-    def _of_lanes(self) -> list[str]:
+    def _lane_lines(self) -> list[str]:
         lines = ["for (int i = 0; i < MSTMM_LANES; i++) codes[i] = 0;"]
         if not self._found:
             return [*lines, "return 0;"]

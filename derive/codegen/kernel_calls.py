@@ -88,7 +88,7 @@ GENERIC_KERNELS = (
 
 @dataclass(frozen=True)
 class Callee:
-    """A kernel as C calls it: `name` after "mstmm_"; `kernel` is the variant with the widest ports.
+    """A kernel as called from C: `name` after "mstmm_", `kernel` with the widest ports.
 
     `by`: "name" for a function, "speeds" for a table by numbers of speeds, "pointer".
     """
@@ -181,7 +181,7 @@ def dispatch_tables(specs: Specs, wanted: Collection[str] | None = None) -> str:
 
 
 def call_text(callee: Callee, plain: Collection[str] = ()) -> str:
-    """C of the call of one kernel; `plain` as in `border.elements.prototype`."""
+    """C of the call of one kernel; `plain` as in `abi.element_library.prototype`."""
     name, fields = f"mstmm_{callee.name}", callee.fields
     inputs = {port.name for port in callee.kernel.inputs}
     has_size = callee.kernel.size_symbol is not None

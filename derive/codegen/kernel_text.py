@@ -37,7 +37,7 @@ _COMPLEX = {
 
 
 def literal_text(text: str) -> str:
-    """C text of a constant ("3", "-1/3", "pi"): exact if a double is exact, else correctly rounded.
+    """C text of a constant ("3", "-1/3", "pi"): exact, or correctly rounded to a double.
 
     The C compiler divides a quotient of two integers that doubles represent exactly.
     """
@@ -141,7 +141,7 @@ class KernelText:
             value, sign = stored_value, "+=" if port.accumulate else "="
             if stored_value.number in subtracted:
                 value, sign = subtracted[stored_value.number], "-="
-            pointer, stride = self._moving(port, index, loop.axis)
+            pointer, stride = self._lane_pointer(port, index, loop.axis)
             if stride == 1 and not has_odd_count:
                 lines.append(f"    *(two_free_t *)({pointer}) {sign} v{value.number};")
                 continue
@@ -160,7 +160,7 @@ class KernelText:
         if value.place is not None:
             port = self.ports[value.place.port]
             index = tuple(int(entry) for entry in value.place.index)
-            pointer, stride = self._moving(port, index, value.axis)
+            pointer, stride = self._lane_pointer(port, index, value.axis)
             if stride == 1 and not odd:
                 return f"mstmm_beside({pointer})"
             distance = f"{stride} * next" if odd else str(stride)
@@ -170,7 +170,7 @@ class KernelText:
         ]
         return OPERATIONS[value.op].c.format(*operand_texts)
 
-    def _moving(self, port: Port, index: tuple[int, ...], axis: int) -> tuple[str, int]:
+    def _lane_pointer(self, port: Port, index: tuple[int, ...], axis: int) -> tuple[str, int]:
         """Pointer to the entry of the loop's k, and the distance to the next entry."""
         stride = port.offset((*index[:axis], index[axis] + 1, *index[axis + 1 :]))
         stride -= port.offset(index)
@@ -189,16 +189,16 @@ class KernelText:
 
     def _statement(self, statement: object) -> dict[str, Any]:
         if isinstance(statement, (Assign, Sum)):
-            return self._inner(statement)
+            return self._inner_statement(statement)
         if isinstance(statement, Store):
             port = self.ports[statement.port]
             return {
                 "kind": "store",
                 "loops": statement.loops,
-                "body": [self._inner(a) for a in statement.body],
+                "body": [self._inner_statement(a) for a in statement.body],
                 "target": self._entry(port, statement.index),
                 "sign": "+=" if port.accumulate else "=",
-                "value": self._stored(statement.value),
+                "value": self._array_operand(statement.value),
             }
         if isinstance(statement, Guard):
             condition = self._truth(statement.condition)
@@ -210,15 +210,15 @@ class KernelText:
         assert isinstance(statement, Solve)
         return self._solve(statement)
 
-    def _inner(self, statement: Inner) -> dict[str, Any]:
+    def _inner_statement(self, statement: Inner) -> dict[str, Any]:
         if isinstance(statement, Assign):
             return self._assign(statement)
         return {
             "kind": "sum",
             "number": statement.number,
             "over": statement.over,
-            "body": [self._inner(inner) for inner in statement.body],
-            "value": self._stored(statement.value),
+            "body": [self._inner_statement(inner) for inner in statement.body],
+            "value": self._array_operand(statement.value),
         }
 
     def _assign(self, assign: Assign) -> dict[str, Any]:
@@ -255,14 +255,14 @@ class KernelText:
             operand_texts = [self.operand(a) for a in args]
             call = "mstmm_complex_scaled({}, {})"
         else:
-            operand_texts = [self._stored(a) for a in assign.args]
+            operand_texts = [self._array_operand(a) for a in assign.args]
             call = _COMPLEX[assign.op]
         return {
             "kind": "assign", "number": assign.number, "expression": call.format(*operand_texts),
             "scalar": "real",
         }  # fmt: skip
 
-    def _stored(self, operand: Operand) -> str:
+    def _array_operand(self, operand: Operand) -> str:
         """C text of an operand in an array's own type."""
         text = self.operand(operand)
         is_real = self._complex and self._all_plain([operand])

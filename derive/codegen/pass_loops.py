@@ -1,4 +1,4 @@
-"""Loops over the subjects of passes, and the sweeps that run them, as C of the looped engine."""
+"""C of the looped engine: loops over subjects of passes, and sweeps that run them."""
 
 from __future__ import annotations
 

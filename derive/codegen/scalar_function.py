@@ -1,7 +1,7 @@
 """A straight-line KernelIR as a C function in any real type: float, double, quadruple.
 
 The text is self-contained and serves references and experiments: every sine is the C library's
-(libquadmath's for quadruple), every constant is rounded once to the type.  `scene` prints the
+(libquadmath's for quadruple), every constant is rounded once to the type.  `scene_text` prints the
 fast code for scenes.
 """
 
@@ -27,7 +27,9 @@ _DIGITS = 45
 
 
 def scalar_source(kernel: KernelIR, scalar: str) -> str:
-    """C text of `static int kernel_NAME(const real *restrict INPUT_, ..., real *restrict OUTPUT_)`.
+    """C text of one static function `kernel_NAME` in a scalar type.
+
+    Its prototype is `int kernel_NAME(const real *restrict INPUT_, ..., real *restrict OUTPUT_)`.
 
     Arrays are dense and row-major, inputs before outputs, in the order of the ports.  Returns 0 or
     the code of the first guard that does not hold; then the outputs are undefined.

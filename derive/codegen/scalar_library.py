@@ -27,7 +27,7 @@ def library_source(kernel: KernelIR, scalar: str) -> str:
 
     It exports `int mstmm_scalar_call(const number *const *in, number *const *out)`: the arrays of
     the kernel's ports in their order, dense; returns 0 or a guard's code.  Outputs that accumulate
-    are added to what their arrays hold.  `number` is the type of the arrays (`scalars`).
+    are added to the values in their arrays.  `number` is the type of the arrays.
 
     Raises ValueError for another type, and for a kernel of run-time size.
     """

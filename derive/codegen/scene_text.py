@@ -213,7 +213,7 @@ def _scalar_load(text: StraightText, operand: Operand) -> str:
 
 def _size_macros(sizes: dict[str, int]) -> str:
     port_of_macro = {"NP": "p", "NQ": "q", "NU": "u", "N_MEMORY": "memory",
-             "N_CLOSURES": "closures"}  # fmt: skip
+                     "N_CLOSURES": "closures"}  # fmt: skip
     lines = [f"#define MSTMM_{macro} {sizes[port]}" for macro, port in port_of_macro.items()]
     return "\n".join([*lines, "#define MSTMM_SOME(n) ((n) ? (n) : 1)", ""])
 

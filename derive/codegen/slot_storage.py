@@ -73,7 +73,7 @@ CLOSURE_SLOTS = {
 COUPLING_SLOTS = {f"coupling.{name}": 1 for name in scene_structure.COUPLING_NUMBERS}
 #: Numbers of a row: slot -> how many.
 ROW_SLOTS = {"row.K": 6, "row.known": 1, "row.pivot": 1, "row.inverse": 1, "row.x": 1,
-       "row.told": 1}  # fmt: skip
+             "row.told": 1}  # fmt: skip
 #: Slots that share the storage of another slot, which is not needed at that time.
 SHARED_SLOTS = {
     "hinge.F": "hinge.H", "modes.felt": "modes.right", "bend.place_right": "bend.right",

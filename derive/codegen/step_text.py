@@ -147,16 +147,16 @@ class StepText:
         sizes: dict[str, int] = {}
         for step in whole.steps:
             for part in () if is_fused_only(step) else _own_steps(step):
-                for slot, size in self._used(part):
+                for slot, size in self._local_uses(part):
                     name, _, entry = slot.partition("[")
                     if slot not in self.given and slot_place(name, self.flat) is None:
                         size = MAX_SPEEDS if entry == "k]" else size
                         if local_name(name) in VARIABLES:
-                            raise ValueError(f"pass {self.name}: {name!r} hides a variable")
+                            raise ValueError(f"pass {self.name}: {name!r} shadows a variable")
                         sizes[local_name(name)] = max(sizes.get(local_name(name), 1), size)
         return sizes
 
-    def _used(self, step: Step) -> Iterator[tuple[str, int]]:
+    def _local_uses(self, step: Step) -> Iterator[tuple[str, int]]:
         if isinstance(step, Call):
             callee, ports = self._callee(step), ports_of(step)
             mode_count = MAX_SPEEDS if ports.get("n") == "free" else 1
@@ -221,24 +221,24 @@ class StepText:
 
     def lines(self, step: Step, indent: str) -> list[str]:
         if isinstance(step, Call):
-            return self._call(step, indent)
+            return self._call_lines(step, indent)
         if isinstance(step, RunPass):
             assert step.whole is not None
             return [f"{indent}code = mstmm_at_{step.whole.name}(state, {self.at});",
                     f"{indent}if (code) return code;"]  # fmt: skip
         if isinstance(step, (Copy, Add)):
-            return self._moved(step, indent)
+            return self._copy_lines(step, indent)
         if isinstance(step, Move):
             target, source = self._place(step.to).text, self._place(step.source).text
             return [f"{indent}memcpy({target}, {source}, (size_t)({step.count}) * sizeof(real));"]
         if isinstance(step, ForEachDirection):
-            return self._along(step, indent)
+            return self._direction_lines(step, indent)
         if isinstance(step, ForEach):
-            return self._each(step, indent)
+            return self._row_loop_lines(step, indent)
         if isinstance(step, SelectColumns):
-            return self._picked(step, indent)
+            return self._select_lines(step, indent)
         if isinstance(step, ScatterSpeeds):
-            return self._spread(step, indent)
+            return self._scatter_lines(step, indent)
         if isinstance(step, Gather):
             target, value_indices = self._place(step.to).text, self._place(step.places).text
             count = slot_size(step.places)
@@ -254,11 +254,11 @@ class StepText:
                 call = (
                     f"mstmm_given_effort_slope(state, force->effort_slope, {', '.join(arguments)})"
                 )
-            return [f"{indent}code = {call};", *self._failed("expression", indent)]
+            return [f"{indent}code = {call};", *self._failure_lines("expression", indent)]
         assert isinstance(step, EachSpeed)
-        return self._each_speed(step, indent)
+        return self._speed_loop_lines(step, indent)
 
-    def _call(self, step: Call, indent: str) -> list[str]:
+    def _call_lines(self, step: Call, indent: str) -> list[str]:
         callee, ports = self._callee(step), ports_of(step)
         size = _KERNEL_SIZES[ports.pop("n", "modes")][0]
         arguments = [f".n = {size}"] if callee.kernel.size_symbol else []
@@ -271,16 +271,16 @@ class StepText:
         unknown = ports.keys() - callee.fields.keys()
         if unknown and not isinstance(step, DifferentiatedCall):
             raise ValueError(f"{step.kernel} has no port {', '.join(sorted(unknown))}")
-        call_head = self._first(step, callee)
+        call_head = self._call_head(step, callee)
         call = f"{call_head}{_wrap_arguments(arguments, indent)}"
         call = call.replace(call_head, _INTERPRETED_CALLS.get(call_head, call_head))
         if not step.fails:
             return [f"{indent}{call};"]
         if step.fails == "tangent":
             call = f"mstmm_judged(state, {call})"
-        return [f"{indent}code = {call};", *self._failed(step.fails, indent)]
+        return [f"{indent}code = {call};", *self._failure_lines(step.fails, indent)]
 
-    def _first(self, step: Call, callee: Callee) -> str:
+    def _call_head(self, step: Call, callee: Callee) -> str:
         element, _, kernel = step.kernel.partition(".")
         name = f"mstmm_{callee.name}"
         if callee.by == "name":
@@ -292,14 +292,14 @@ class StepText:
         count = {"generic{nu}": "nu", "generic{free}": "speeds"}.get(element, element[7:])
         return f"{name}({count},"
 
-    def _failed(self, reason: str, indent: str) -> list[str]:
+    def _failure_lines(self, reason: str, indent: str) -> list[str]:
         state, index = ("at.state", "at.index") if self.subject == "link" else ("state", "index")
         macro = f"MSTMM_FAILED_{reason.upper()}"
         return [f"{indent}if (code) return mstmm_fail({state}, {macro}, {index}, code);"]
 
-    def _moved(self, step: Copy | Add, indent: str) -> list[str]:
+    def _copy_lines(self, step: Copy | Add, indent: str) -> list[str]:
         target = self._place(step.to).text
-        size = self._moved_size(step)
+        size = self._copy_size(step)
         if isinstance(step, Add):
             sign = "-=" if step.times < 0 else "+="
             factor = f"{abs(step.times)} * " if abs(step.times) != 1 else ""
@@ -327,13 +327,13 @@ class StepText:
         return [f"{indent}for (int j = 0; j < {size}; j++)",
                 f"{indent}    {_entry_text(target)} = {value};"]  # fmt: skip
 
-    def _moved_size(self, step: Copy | Add) -> str:
+    def _copy_size(self, step: Copy | Add) -> str:
         for slot in (step.to, step.source):
             if slot and not slot.removeprefix(D).startswith("local."):
                 return slot_size(slot)
         return str(self.locals[local_name(step.to)])
 
-    def _picked(self, step: SelectColumns, indent: str) -> list[str]:
+    def _select_lines(self, step: SelectColumns, indent: str) -> list[str]:
         target, source = self._place(step.to).text, self._place(step.source).text
         if step.rows == 1:
             return [
@@ -346,7 +346,7 @@ class StepText:
                 f"{indent}        {_entry_text(target, 'row * speeds + k')} = "
                 f"{_entry_text(source, f'{row} * nu + columns[k]')};"]  # fmt: skip
 
-    def _spread(self, step: ScatterSpeeds, indent: str) -> list[str]:
+    def _scatter_lines(self, step: ScatterSpeeds, indent: str) -> list[str]:
         target, free = self._place(step.to).text, self._place(step.free).text
         imposed = _entry_text(self._place(step.imposed).text) if step.imposed else "0"
         return [
@@ -356,14 +356,14 @@ class StepText:
             f"{indent}                 : {imposed};",
         ]
 
-    def _along(self, step: ForEachDirection, indent: str) -> list[str]:
+    def _direction_lines(self, step: ForEachDirection, indent: str) -> list[str]:
         count, aim, _ = _DIRECTION_LOOPS[step.of]
         aims = f"{aim};".replace("\n", f"\n{indent}    ")
         lines = [f"{indent}for (int c = 0; c < {count}; c++) {{", f"{indent}    {aims}"]
-        lines += self._inside(step.steps, indent + "    ")
+        lines += self._inner_lines(step.steps, indent + "    ")
         return [*lines, f"{indent}}}", f"{indent}{_DIRECTION_RESETS[step.of]};"]
 
-    def _inside(self, steps: Iterable[Step], indent: str) -> list[str]:
+    def _inner_lines(self, steps: Iterable[Step], indent: str) -> list[str]:
         """C lines of steps in a loop, each under its condition."""
         lines = []
         for part in steps:
@@ -378,15 +378,15 @@ class StepText:
                 lines += self.lines(part, indent)
         return lines
 
-    def _each(self, step: ForEach, indent: str) -> list[str]:
+    def _row_loop_lines(self, step: ForEach, indent: str) -> list[str]:
         order, declaration, _ = _ROW_LOOPS[step.of]
         self.at = "r" if step.of in ("closings", "openings") else self.at
-        body_lines = self._inside(step.steps, indent + "    ")
+        body_lines = self._inner_lines(step.steps, indent + "    ")
         self.at = "index"
         declaration_lines = [f"{indent}    {declaration}"] if declaration else []
         return [f"{indent}for ({order}) {{", *declaration_lines, *body_lines, f"{indent}}}"]
 
-    def _each_speed(self, step: EachSpeed, indent: str) -> list[str]:
+    def _speed_loop_lines(self, step: EachSpeed, indent: str) -> list[str]:
         condition_lines = (
             [f"{indent}    if (!body->imposed_mask[k]) continue;"] if step.imposed else []
         )

@@ -3,7 +3,7 @@
 A kernel without run-time size becomes one `const` per value, in an order in which every value
 follows its operands.  The same lines are printed in several dialects: plain numbers of any
 real type, and GNU C vectors, whose operations are spelled as functions of the support text
-(templates/fused_*.c).  Ports get an underscore behind their names, so that they clash with no
+(templates/fused_*.c).  An underscore is appended to names of ports, so that they clash with no
 other name.
 """
 
@@ -20,7 +20,7 @@ from .kernel_text import literal_text
 
 @dataclass(frozen=True)
 class Dialect:
-    """How C spells values: their types in registers and in arrays, truths, prefix of functions."""
+    """C spelling of values: types in registers and arrays, truth type, function prefix."""
 
     real: str
     array: str
@@ -51,7 +51,7 @@ class StraightText:
 
     def __init__(self, kernel: KernelIR, dialect: Dialect) -> None:
         if kernel.size_symbol is not None:
-            raise ValueError(f"{kernel.name}: a kernel of run-time size is no straight line")
+            raise ValueError(f"{kernel.name}: expected a kernel of fixed size")
         self.kernel, self.dialect = kernel, dialect
         self.ports: dict[str, Port] = {p.name: p for p in (*kernel.inputs, *kernel.outputs)}
         #: Temporaries that are truth values.

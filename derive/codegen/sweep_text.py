@@ -116,7 +116,7 @@ def _planar_directions_text(specs: Specs) -> str:
 
 
 def _size_functions() -> str:
-    """Sizes of what flexible bodies keep in the workspace."""
+    """Sizes of the data of flexible bodies in the workspace."""
 
     def total(layout: dict[str, tuple[int, int]], second: str) -> str:
         per_mode, per_pair = (sum(sizes[k] for sizes in layout.values()) for k in (0, 1))

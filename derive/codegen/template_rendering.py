@@ -48,7 +48,7 @@ def mstmm_header() -> str:
 
 
 def registry_source(specs: Sequence[ElementSpec]) -> str:
-    """`registry.c`: the table of the descriptors of what has C, in the order given."""
+    """`registry.c`: table of the descriptors of elements with C, in the order given."""
     return _render("registry.c.jinja", elements=_summaries(specs))
 
 
@@ -63,9 +63,9 @@ def engine_headers() -> dict[str, str]:
 
 
 def manifest_text(specs: Sequence[ElementSpec], files: Mapping[str, str]) -> str:
-    """`manifest.json`: ABI number, SHA-256 of the C text, names and hashes of elements and kernels.
+    """`manifest.json`: ABI number, SHA-256 of the C text, names and hashes of kernels.
 
-    It identifies a module that was compiled from other text (`build_extension.built_from`).
+    It detects a module that was compiled from other text (runtime/libraries/build_extension.py).
     """
     text = hashlib.sha256()
     for name in sorted(name for name in files if name.endswith((".c", ".h"))):

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 from mstmm.ir import OPERATIONS, Assign, Element, KernelIR, Operand, Port, Store, Temporary
 
-#: (element, kernel) -> (output, axis along which its entries are alike), in the order in which they
-#: are computed; later outputs read the values of earlier ones.
+#: (element, kernel) -> (output, axis along which all entries have equal computations), in the order
+#: in which they are computed; later outputs read the values of earlier ones.
 VECTORIZED_OUTPUTS: dict[tuple[str, str], tuple[tuple[str, int], ...]] = {
     ("frames", "tangent_carry"): (("T", 1), ("S_I", 0)),
     ("frames", "tangent_known"): (("e_S", 0), ("e_b", 0)),
@@ -84,11 +84,11 @@ class VectorLoops:
         self.assigned = {s.number: s for s in kernel.statements if isinstance(s, Assign)}
         self.ports = {port.name: port for port in kernel.outputs}
         self.kept: dict[Operand, Element] = {}
-        self.loops = [self._loop(self.ports[name], axis) for name, axis in requests]
+        self.loops = [self._vector_loop(self.ports[name], axis) for name, axis in requests]
         looped_names = {name for name, _ in requests}
         remaining_statements = [s for s in kernel.statements if not isinstance(s, Assign)]
         if not all(isinstance(s, Store) for s in remaining_statements):
-            raise ValueError(f"{kernel.name}: a guard among loops")
+            raise ValueError(f"{kernel.name}: vector loops support no guards")
         self.others = [
             s for s in remaining_statements if isinstance(s, Store) and s.port not in looped_names
         ]
@@ -110,9 +110,9 @@ class VectorLoops:
         """Output entry that stores an operand, or the operand."""
         return self.kept.get(operand, operand)
 
-    def _loop(self, port: Port, axis: int) -> VectorLoop:
+    def _vector_loop(self, port: Port, axis: int) -> VectorLoop:
         stored_values = {s.index: s.value for s in self.kernel.statements
-                  if isinstance(s, Store) and s.port == port.name}  # fmt: skip
+                         if isinstance(s, Store) and s.port == port.name}  # fmt: skip
         loop = _Builder(self, VectorLoop(port, axis))
         for index in stored_values:
             if index[axis] == 0:
@@ -153,7 +153,7 @@ class _Builder:
             return self.shared(lanes[0])
         value = self.known.get(lanes)
         if value is None:
-            value = self.known[lanes] = self._made(lanes)
+            value = self.known[lanes] = self._new_value(lanes)
             self.loop.values.append(value)
         return value
 
@@ -163,7 +163,7 @@ class _Builder:
             self.loop.shared.append(operand.number)
         return operand
 
-    def _made(self, lanes: _LaneOperands) -> LaneValue:
+    def _new_value(self, lanes: _LaneOperands) -> LaneValue:
         number = len(self.loop.values)
         entries = [self.whole.read(lane) for lane in lanes]
         axis = _moving_axis(entries)
@@ -172,13 +172,13 @@ class _Builder:
             return LaneValue(number, "", (), entries[0], axis)
         if not all(self.alike(lanes[0], lane, k) for k, lane in enumerate(lanes)):
             raise self.error(f"entries of {self.loop.port.name} are not computed alike")
-        rows = [self._args(lanes[0], lane, k) for k, lane in enumerate(lanes)]
+        rows = [self._lane_arguments(lanes[0], lane, k) for k, lane in enumerate(lanes)]
         args = tuple(self.value(column) for column in zip(*rows, strict=True))
         first_lane = lanes[0]
         assert isinstance(first_lane, Temporary)
         return LaneValue(len(self.loop.values), self.whole.assigned[first_lane.number].op, args)
 
-    def _args(self, first: Operand, operand: Operand, k: int) -> tuple[Operand, ...]:
+    def _lane_arguments(self, first: Operand, operand: Operand, k: int) -> tuple[Operand, ...]:
         """Operands of lane k, in the order of those of the first lane."""
         assert isinstance(first, Temporary) and isinstance(operand, Temporary)
         reference_args, operand_args = (
@@ -192,10 +192,10 @@ class _Builder:
         """Whether an operand of lane k has the same computation as in the first lane."""
         key = first, operand, k
         if key not in self.like:
-            self.like[key] = first == operand or self._alike(first, operand, k)
+            self.like[key] = first == operand or self._has_same_computation(first, operand, k)
         return self.like[key]
 
-    def _alike(self, first: Operand, other: Operand, k: int) -> bool:
+    def _has_same_computation(self, first: Operand, other: Operand, k: int) -> bool:
         entries = [self.whole.read(operand) for operand in (first, other)]
         if _moving_axis([entries[0], *[None] * (k - 1), entries[1]]) is not None:
             return True
