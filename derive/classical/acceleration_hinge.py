@@ -40,7 +40,7 @@ def statement(free: tuple[str, ...] = SPATIAL_DIRECTIONS, planar: bool = False) 
     directions = PLANAR_DIRECTIONS if planar else SPATIAL_DIRECTIONS
     if not free or len(set(free)) != len(free) or not set(free) <= set(directions):
         raise ValueError(
-            f"free directions are some of {', '.join(directions)}, each once; not {free}"
+            f"free directions: expected some of {', '.join(directions)}, each once, found {free}"
         )
     free_directions = tuple(name for name in directions if name in free)
     is_complete = free_directions == directions

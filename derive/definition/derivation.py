@@ -125,7 +125,7 @@ class Derivation:
         for equation in self.definitions:
             if str(getattr(equation.left, "name", equation.left)) == name:
                 return equation.right
-        raise KeyError(f"{self.element}: nothing defines {name!r}")
+        raise KeyError(f"{self.element}: no equation defines {name!r}")
 
 
 class Solve(sp.MatrixExpr):

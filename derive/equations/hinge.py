@@ -1,4 +1,4 @@
-"""Motion of any hinge from its rotation and position alone: subspace, bias, and their checks.
+"""Motion of any hinge from its rotation and position: subspace, bias, and their checks.
 
 With R(q) (P axes to Q axes), d(q) (P from Q, Q axes) and qdot = N(q) u:
 

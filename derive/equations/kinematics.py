@@ -347,7 +347,7 @@ def rotor_energy() -> Derivation:
 
 
 def driven_effort() -> Derivation:
-    """Effort on one speed beyond a given one: tau_d = felt + J udot - tau."""
+    """Effort on one speed beyond a given one: tau_d = load + J udot - tau."""
     load, inertia, rate, stated, effort = (
         symbol(name, 1) for name in ("felt", "J", "udot", "tau", "tau_d")
     )

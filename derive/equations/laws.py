@@ -1,7 +1,7 @@
 """Laws on hinge coordinates: springs, dampers, efforts, friction, limits; with energies.
 
-Every law returns the efforts tau, the stored energy V and the power P of what is not stored
-(dampers, friction, given efforts), with P = tau . u + dV/dt, so that energies can be balanced.
+Every law returns the efforts tau, the stored energy V and the power P of the rest (dampers,
+friction, given efforts), with P = tau . u + dV/dt, so that energies can be balanced.
 """
 
 from __future__ import annotations

@@ -262,8 +262,8 @@ def _accumulated(name: str, rows: int = 1, meaning: str = "") -> Quantity:
 def settle() -> Derivation:
     """1 / L_rr of the closing row r.
 
-    A pivot below `floor` stands for rounding: what moves the row is held already, and the row goes
-    without a multiplier.
+    A pivot below `floor` counts as rounding: the row has no free motion left, and its
+    multiplier is zero.
     """
     floor = Quantity(symbol("floor", 1), "", "largest pivot that is rounding")
     pivot = PIVOT.symbol[0, 0]

@@ -67,7 +67,7 @@ class MassDistribution:
             total = sp.Integer(0)
             for powers, coefficient in sp.Poly(entry, *POINT).terms():
                 if powers not in weights:
-                    raise ValueError(f"a moment of degree {sum(powers)} in {entry}")
+                    raise ValueError(f"{entry}: expected degree <= 2, found degree {sum(powers)}")
                 total += coefficient * weights[powers]
             return sp.expand(total)
 

@@ -148,7 +148,10 @@ class RowSlots(Slots):
         return super()._scene_data(slot)
 
     def _entry(self, row_index: int, column_index: int) -> Nodes:
-        """Initial entry of L: 1 / `soft` of a soft row, -`_NEVER` for a rotor at rest."""
+        """Initial entry of L: 1 / `soft` of a soft row, or a pivot that keeps it inactive.
+
+        A rotor at rest gets -`_INACTIVE_PIVOT`, which is below every floor.
+        """
         f = self.state
         row = f.structure.rows[row_index]
         soft = f.entries(row.soft) if row_index == column_index else []

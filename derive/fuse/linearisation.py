@@ -79,7 +79,7 @@ def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:
 
 
 class _StateDerivatives:
-    """One scene about any state: efforts R, and the coordinate change along each free speed."""
+    """Derivatives of a scene at any state: efforts R, and coordinate change per free speed."""
 
     def __init__(self, structure: Structure, kernels: Kernels, free: Sequence[int]) -> None:
         state = FusionState(structure, kernels, None)
@@ -95,7 +95,7 @@ class _StateDerivatives:
         self.r = [required[j] for j in free]
 
     def along(self, port: str, index: int, node: Node) -> Node:
-        """Seed of a derivative: the node of one input entry with the value `one`."""
+        """Derivative of a node by one entry of an input."""
         return derivative(node, {self.graph.element(port, index): 1})
 
     def slopes(self) -> dict[str, object]:

@@ -273,7 +273,7 @@ class ScheduleInterpreter(RowSlots):
                 self.conditions.append(condition)
                 return
             positive = condition.op == "lt" and condition.args[0].value == 0
-            # `_judge_pivots` applies a stricter limit to these pivots.
+            # `_check_pivots` applies a stricter limit to these pivots.
             if not (positive and reason == "undetermined"):
                 self.state.fail_unless(condition, int(FailureCode[reason.upper()]), element, code)
 
@@ -360,7 +360,10 @@ class ScheduleInterpreter(RowSlots):
             self.steps(step.otherwise)
 
     def _choose_bias(self, step: ChooseBias) -> None:
-        """Move known accelerations into the motion; skip rotors, which need all of udot."""
+        """Cancel the bias motion along free unit directions.
+
+        Rotors are skipped, because their effort depends on all of udot.
+        """
         body, nu = self.body, self.body.nu
         if any(body.imposed) or any(isinstance(x, int) or x != 0.0 for x in body.rotor):
             return

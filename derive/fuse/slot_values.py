@@ -163,7 +163,7 @@ class Slots:
             return self.at.index, slot
         return self.index, slot
 
-    # --- what the scene gives -------------------------------------------------------------------
+    # --- scene data ------------------------------------------------------------------------------
 
     def _scene_data(self, slot: str) -> Nodes:
         owner, _, name = slot.partition(".")

@@ -19,7 +19,7 @@ def lower(
     """KernelIR of the derivation's definitions.
 
     `guards` are (condition, failure code, message) over the derivation's quantities.
-    Quantities with a run-time size are lowered as `lower_sized` says.
+    Quantities with a run-time size are lowered as in `variable_size`.
     Raises NotImplementedError, naming the expression, for SymPy that has no counterpart in the IR.
     """
     size = derivation.size

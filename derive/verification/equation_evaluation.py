@@ -154,10 +154,10 @@ class _Values:
         pending_guards = list(guards)
         for equation in derivation.definitions:
             self.known[str(equation.left.name)] = self.matrix(equation.right)
-            pending_guards = [g for g in pending_guards if not self._holds(g)]
+            pending_guards = [g for g in pending_guards if not self._check_guard(g)]
         assert not pending_guards, "a guard reads a quantity that no equation defines"
 
-    def _holds(self, guard: tuple[sp.Basic, int, str]) -> bool:
+    def _check_guard(self, guard: tuple[sp.Basic, int, str]) -> bool:
         """Check a guard; return False while its quantities are not known."""
         condition, code, message = guard
         names = {str(s.name) for s in condition.atoms(sp.MatrixSymbol)}
@@ -202,7 +202,7 @@ class _Values:
             return self._solve(lower.T if e.transposed else lower, e.right)
         if isinstance(e, Triangle):
             return self._triangle(self.matrix(e.matrix), e.count)
-        raise NotImplementedError(f"no direct value of {type(e).__name__}")
+        raise NotImplementedError(f"cannot evaluate {type(e).__name__}")
 
     def _product(self, e: sp.MatMul, height: int, width: int) -> Matrix:
         if any(0 in (int(a.shape[0]), int(a.shape[1])) for a in e.args if a.is_Matrix):
@@ -231,7 +231,7 @@ class _Values:
             try:
                 root = mpmath.cholesky(a)
             except ValueError as error:
-                raise Undefined(f"no positive definite matrix: {error}") from None
+                raise Undefined(f"matrix not positive definite: {error}") from None
             factor = mpmath.zeros(n, n)
             for i in range(n):
                 factor[i, i] = 1 / root[i, i] ** 2
@@ -240,8 +240,10 @@ class _Values:
             return factor
 
     def _triangle(self, a: Matrix, count: int) -> Matrix:
-        """Rows of R by Gram-Schmidt orthogonalisation; a column that depends linearly on earlier
-        ones gives a row of zeros."""
+        """Rows of R by Gram-Schmidt orthogonalisation.
+
+        A column that depends linearly on earlier ones gives a row of zeros.
+        """
         with mpmath.workdps(2 * self.digits):
             columns = [a[:, j] for j in range(a.cols)]
             sizes = [mpmath.norm(column) for column in columns]
@@ -290,14 +292,14 @@ class _Values:
         if isinstance(e, (sp.Rational, sp.Float, sp.NumberSymbol)):
             return mpmath.mpf(e._to_mpmath(mpmath.mp.prec))
         if e is sp.I or e in (sp.nan, sp.zoo, sp.oo, -sp.oo):
-            raise Undefined(f"{e} is no real number")
+            raise Undefined(f"{e} is not a real number")
         if isinstance(e, sp.Piecewise):
             return next(self.scalar(value) for value, condition in e.args if self.truth(condition))
         function = _FUNCTIONS.get(type(e)) or next(
             (f for kind, f in _FUNCTIONS.items() if isinstance(e, kind)), None
         )
         if function is None:
-            raise NotImplementedError(f"no direct value of {e} ({type(e).__name__})")
+            raise NotImplementedError(f"cannot evaluate {e} ({type(e).__name__})")
         try:
             value = function(*(self.scalar(a) for a in e.args))
         except ZeroDivisionError:

@@ -196,7 +196,7 @@ def _check_near_branch(
     """Evaluate the properties on both sides of a point where branches may meet.
 
     Differences across the point are wrong.  Continuous quantities are compared at the point;
-    the bias may jump, and then lies between both sides.
+    the bias may jump, and must then be between the values of both sides.
     """
     previous, following = hinge.coordinates(-BRANCH_DISTANCE), hinge.coordinates(BRANCH_DISTANCE)
     errors = evaluate_errors(previous)

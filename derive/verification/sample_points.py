@@ -67,8 +67,8 @@ class InputSampler:
         numbers = random.Random(f"{self.seed} {kernel.name}")
         if kernel.size_symbol is not None:
             for n in _RUN_TIME_SIZES:
-                yield Point(f"random, n = {n}", self._drawn(kernel, numbers, n), n)
-            rest_point = self._still(kernel, numbers, _RUN_TIME_SIZES[-1])
+                yield Point(f"random, n = {n}", self._draw_inputs(kernel, numbers, n), n)
+            rest_point = self._rest_point(kernel, numbers, _RUN_TIME_SIZES[-1])
             yield Point(
                 f"{rest_point.label}, n = {_RUN_TIME_SIZES[-1]}",
                 rest_point.inputs,
@@ -77,21 +77,24 @@ class InputSampler:
             return
         names = {port.name for port in kernel.inputs}
         for k in range(count):
-            yield Point(f"random {k + 1}", self._drawn(kernel, numbers))
+            yield Point(f"random {k + 1}", self._draw_inputs(kernel, numbers))
         if {"coulomb", "swing"} & set(_law_kind(kernel)):
-            yield from self._laws(kernel, numbers)
+            yield from self._law_points(kernel, numbers)
             return
-        yield self._still(kernel, numbers)
+        yield self._rest_point(kernel, numbers)
         if self.kind == "hinge" and "q" in names:
             for label in list(_TURNS)[1:]:
-                inputs = self._drawn(kernel, numbers)
+                inputs = self._draw_inputs(kernel, numbers)
                 inputs["q"] = self.coordinate_values(numbers, label)
                 yield Point(label, inputs)
         if names & _INERTIA_PORTS or (self.kind == "body" and "p" in names):
             for label, factor in _MASS_FACTORS.items():
-                yield Point(label, self._scaled(self._drawn(kernel, numbers), factor))
+                drawn = self._draw_inputs(kernel, numbers)
+                yield Point(label, self._scale_inputs(drawn, factor))
 
-    def _drawn(self, kernel: KernelIR, numbers: random.Random, n: int = 0) -> dict[str, Numbers]:
+    def _draw_inputs(
+        self, kernel: KernelIR, numbers: random.Random, n: int = 0
+    ) -> dict[str, Numbers]:
         return {port.name: self.draw(port, kernel, numbers, n) for port in kernel.inputs}
 
     def draw(self, port: Port, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Numbers:
@@ -157,7 +160,7 @@ class InputSampler:
             values += [*random_rotation(numbers), *_uniform_values(3, numbers)]
         return values
 
-    def _still(self, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Point:
+    def _rest_point(self, kernel: KernelIR, numbers: random.Random, n: int = 0) -> Point:
         """Point without motion, rotation or load: only parameters and inertias."""
         inputs = {}
         for port in kernel.inputs:
@@ -173,7 +176,7 @@ class InputSampler:
             inputs[port.name] = values
         return Point("rest", inputs)
 
-    def _scaled(self, inputs: dict[str, Numbers], factor: float) -> dict[str, Numbers]:
+    def _scale_inputs(self, inputs: dict[str, Numbers], factor: float) -> dict[str, Numbers]:
         scaled_ports = _INERTIA_PORTS | ({"p"} if self.kind == "body" else set())
         parameter_count = len(self.parameters)
         return {
@@ -187,10 +190,10 @@ class InputSampler:
 
     # --- laws -----------------------------------------------------------------------------------
 
-    def _laws(self, kernel: KernelIR, numbers: random.Random) -> Iterator[Point]:
+    def _law_points(self, kernel: KernelIR, numbers: random.Random) -> Iterator[Point]:
         special = _swing_points if "swing" in _law_kind(kernel) else _limit_points
         for label, change in special():
-            inputs = self._drawn(kernel, numbers)
+            inputs = self._draw_inputs(kernel, numbers)
             change(inputs)
             yield Point(label, inputs)
 

@@ -84,7 +84,7 @@ class _Balance:
                 condition = self._new_operand(statement.condition)
                 self.statements.append(Guard(condition, statement.code, statement.message))
             else:
-                raise ValueError(f"{k.name}: a run-time sized kernel has no sums to regroup")
+                raise ValueError(f"{k.name}: expected a kernel of fixed size")
         return KernelIR(
             k.name, k.inputs, k.outputs, tuple(self.statements), None, k.purpose, k.sources
         )
@@ -168,4 +168,4 @@ def operands(statement: Statement) -> tuple[Operand, ...]:
         return (statement.value,)
     if isinstance(statement, Guard):
         return (statement.condition,)
-    raise ValueError("a run-time sized statement has no place here")
+    raise ValueError(f"expected a straight-line statement, found {type(statement).__name__}")
