@@ -109,10 +109,10 @@ def compile_level(
     from ..runtime.kernels import kernel_store
     from ..runtime.model.model import Model
     from ..runtime.packing.flexible.rigid_substitution import with_level
-    from ..runtime.packing.merging.simplification import asked_for
+    from ..runtime.packing.merging.simplification import parse_simplify
     from .fused_code import DEFAULT_MAX_BODIES, MAX_BODIES, FusionFactory
 
-    simplifications = asked_for(simplify)
+    simplifications = parse_simplify(simplify)
     scene = with_level(scene, flexibility)
 
     elements, definitions = kernel_store.load_known(kernel_store.required_types(scene))

@@ -21,7 +21,7 @@ from ..numerics.symbolic_number import Formula, SymbolTable, factor_of_symbol, f
 from ..runtime.kernels import kernel_store
 from ..runtime.packing import scene_parameters
 from ..runtime.packing.fused_structure import structure_and_numbers
-from ..runtime.packing.parameter_derivatives import refuse_folded, seed_derivatives
+from ..runtime.packing.parameter_derivatives import reject_folded_parameters, seed_derivatives
 from .fused_code import kernel_lookup
 from .symbolic_linear_model import evaluate_symbolically
 from .sympy_expressions import SympyWriter
@@ -80,7 +80,7 @@ def symbolic_equations(model: Model, keep: Sequence[str] = ()) -> SymbolicEquati
     _require_small_tree(model)
     if isinstance(keep, str):
         raise SceneError(f'keep = {keep!r}: expected a list of names such as ["rod1.mass"]')
-    refuse_folded(model.scene, list(keep), "formula; keep other parameters")
+    reject_folded_parameters(model.scene, list(keep), "formula; keep other parameters")
     return _EquationBuilder(model, keep).equations()
 
 

@@ -28,7 +28,7 @@ from ..runtime.linear.input_channels import Channel
 from ..runtime.linear.symbolic_matrices import SymbolicLinearModel
 from ..runtime.packing.expression_tapes import MOVING, state_ports
 from ..runtime.packing.fused_structure import structure_and_numbers
-from ..runtime.packing.parameter_derivatives import refuse_folded, seed_derivatives
+from ..runtime.packing.parameter_derivatives import reject_folded_parameters, seed_derivatives
 from ..runtime.packing.system import LoadNumbers, System
 from .symbolic_names import SymbolNames, resolve_kept_names
 from .sympy_expressions import SympyWriter
@@ -56,7 +56,7 @@ def symbolic_linear_model(
     _require_symbolic(linear)
     names = resolve_kept_names(linear, keep)
     reason = "formula; linearize models of other values"
-    refuse_folded(linear.model.scene, list(names.parameters), reason)
+    reject_folded_parameters(linear.model.scene, list(names.parameters), reason)
     equations = _FormulaEquations(linear, names, kernels)
     writer = SympyWriter()
     symbols = {name: writer.symbol(equations.symbols[name]) for name in keep}

@@ -15,7 +15,7 @@ from ..packing import product_sweep
 from ..packing import scene_parameters as named_parameters
 from ..packing.coordinate_layout import Layout
 from ..packing.merging.simplification import LINKED, Simplification, Words
-from ..packing.packed_scene import PackedScene, resize
+from ..packing.packed_scene import PackedScene, resize_workspace
 from ..packing.scene_elements import Known
 from ..packing.scene_packing import pack, without_merging
 from .characteristic_scales import speed_scales
@@ -68,8 +68,8 @@ class CompiledScene:
                 raise SceneError(f"scene: {failure}") from None
             self.looped = self.closed.engine
             if product_accuracy is not None:
-                product_sweep.attach(self.packed, product_accuracy)
-                resize(self.packed, self.packed.written.slots)
+                product_sweep.enable_product_sweep(self.packed, product_accuracy)
+                resize_workspace(self.packed, self.packed.written.slots)
         elif self.packed.refined:
             self.packed.model.refines = count_tree_refinements(self.looped)
         self.fusion: FusedCode = fusing(self.packed, self.known) if fusing else NoFusedCode()

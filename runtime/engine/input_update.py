@@ -11,7 +11,7 @@ from ..packing.packed_scene import PackedScene
 from ..packing.records.memory import Memory
 from ..packing.records.model_record import write_inputs
 from ..packing.system import HeldInputs, System
-from ..packing.system_builder import by_time
+from ..packing.system_builder import has_timed_loads
 
 
 def with_input_values(packed: PackedScene, values: Mapping[str, float | str]) -> PackedScene:
@@ -21,7 +21,7 @@ def with_input_values(packed: PackedScene, values: Mapping[str, float | str]) ->
     is_unexpanded = expanded.scene is expanded.described
     expanded_scene = described if is_unexpanded else expanded.scene.with_inputs(values)
     channels = described.channels
-    time_inputs = by_time(expanded_scene, channels)
+    time_inputs = has_timed_loads(expanded_scene, channels)
     system = replace(packed.system, inputs=tuple(channels.values()), by_time=time_inputs)
     renewed_packed = _with_new_records(packed, system)
     renewed_packed.scene, renewed_packed.expanded = (
@@ -54,7 +54,9 @@ def with_input_pieces(packed: PackedScene, named: Mapping[str, PiecewisePolynomi
     """
     channels = packed.channels | dict(named)
     system = replace(
-        packed.system, inputs=tuple(channels.values()), by_time=by_time(packed.scene, channels)
+        packed.system,
+        inputs=tuple(channels.values()),
+        by_time=has_timed_loads(packed.scene, channels),
     )
     return _with_new_records(packed, system)
 

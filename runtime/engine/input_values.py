@@ -14,7 +14,7 @@ from mstmm.scene.checks.inputs import input_references
 from mstmm.scene.validators.validation_messages import did_you_mean
 
 from ..discontinuities.active_expressions import active_expressions
-from ..packing.scene_parameters import data_of, made_of
+from ..packing.scene_parameters import scene_data, scene_from_data
 
 #: A number, the name of a signal, (times, values), or the keys of a [[signal]].
 InputValue = float | str | tuple[ArrayLike, ArrayLike] | Mapping[str, Any]
@@ -54,7 +54,7 @@ def scene_with_inputs(scene: Scene, inputs: Mapping[str, InputValue]) -> Scene:
 
     Raises SceneError for unknown inputs and invalid values.
     """
-    data = data_of(scene)
+    data = scene_data(scene)
     tables = {table["name"]: table for table in data.get("input", [])}
     for name, value in mapping_by_name("inputs", inputs).items():
         if name not in tables:
@@ -74,7 +74,7 @@ def scene_with_inputs(scene: Scene, inputs: Mapping[str, InputValue]) -> Scene:
         signals.append(signal | {"unit": tables[name]["unit"]})
         tables[name]["value"] = signal["name"]
         tables[name].pop("rates", None)
-    return made_of(data, scene, "scene with these inputs")
+    return scene_from_data(data, scene, "scene with these inputs")
 
 
 def _check_not_controlled(name: str, scene: Scene) -> None:

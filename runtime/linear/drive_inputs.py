@@ -25,7 +25,7 @@ from ..engine.looped_engine import LoopedEngine
 from ..engine.observation_columns import acceleration_name, rate_unit
 from ..engine.tangent_matrix import TangentMatrix
 from ..packing.coordinate_layout import HingeSlots
-from ..packing.loops.system_variants import undriven
+from ..packing.loops.system_variants import without_drives
 from ..packing.scene_packing import packed_system
 from .mck_matrices import State
 
@@ -142,4 +142,4 @@ def slopes_along(engine: LoopedEngine, state: State, along: Array) -> Columns:
 
 def _undriven(engine: LoopedEngine) -> LoopedEngine:
     """The tree with the same numbers, moved by nobody."""
-    return LoopedEngine(packed_system(undriven(engine.packed.system), engine.packed))
+    return LoopedEngine(packed_system(without_drives(engine.packed.system), engine.packed))

@@ -15,7 +15,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.risk import AssessedAnswer
 
-from ..packing.coordinate_layout import refuse_dense
+from ..packing.coordinate_layout import check_dense_size
 from ..run.scene_system import SceneSystem
 from .drive_inputs import Columns, Moves, columns_of, coordinate
 from .frozen_loads import standing, with_frozen_springs, without_laws
@@ -120,7 +120,7 @@ class LinearEquations(AssessedAnswer):
         about = self.about
         if about is not None:
             return self._second_order(Matrices(about.M, about.C, about.K))
-        refuse_dense(len(self), "the matrix of a linear model")
+        check_dense_size(len(self), "the matrix of a linear model")
         return self._second_order(self._of(self.tree))
 
     @cached_property

@@ -16,7 +16,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.risk import Risk
 
-from ..packing.coordinate_layout import refuse_dense
+from ..packing.coordinate_layout import check_dense_size
 from .frequency_response import FrequencyResponse, frequency_response
 from .harmonic.dynamic_stiffness_modes import DynamicStiffnessModes, exact_modes
 from .harmonic.exact_beams import Chosen
@@ -46,7 +46,7 @@ class Linear(StateSpace):
             raise SceneError(f"damped = {abbreviate(damped)}: expected True, False or None")
         self.check_count(count, len(self))
         if count is None:
-            refuse_dense(len(self), "the matrix of all motions")
+            check_dense_size(len(self), "the matrix of all motions")
         return modes(self, count, damped)
 
     @cached_property

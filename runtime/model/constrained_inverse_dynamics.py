@@ -17,7 +17,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.compiled_scene import CompiledScene
 from ..engine.loops.independent_speeds import IndependentSpeeds
 from ..linear.input_channels import channel, names_of
-from ..packing.coordinate_layout import refuse_dense
+from ..packing.coordinate_layout import check_dense_size
 
 #: Largest deviation of given accelerations from closed loops, relative to the largest one.
 _MAX_OPENING = 1e-6

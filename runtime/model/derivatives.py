@@ -25,7 +25,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.live_inputs import LiveInputs
 from ..engine.tangent_kernels import TangentKernels
 from ..packing.fused_structure import structure_of
-from ..packing.parameter_derivatives import slopes
+from ..packing.parameter_derivatives import parameter_derivatives
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
@@ -95,7 +95,9 @@ class Differentiation:
         known = model.known or {}
         _check_differentiable(model)
         if names:
-            structure, self.p, self.slopes = slopes(model.scene, known, names, model.packed)
+            structure, self.p, self.slopes = parameter_derivatives(
+                model.scene, known, names, model.packed
+            )
         else:
             packed = model.packed
             structure, self.p = structure_of(packed.system, known, floors=packed.floors)

@@ -18,7 +18,7 @@ from mstmm.array_validation import Array, batch, copy_to
 from mstmm.array_validation import right_hand_sides as columns_of
 from mstmm.errors import SceneError
 
-from ..packing.coordinate_layout import refuse_dense
+from ..packing.coordinate_layout import check_dense_size
 from .kinematics import KinematicQueries
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ class DynamicsQueries(KinematicQueries):
             matrix: Array | None = calls.mass(q)
             if matrix is not None:
                 return matrix if out is None else copy_to(out, matrix)
-            refuse_dense(self.nu, "the mass matrix")
+            check_dense_size(self.nu, "the mass matrix")
         lead, (states,) = batch(("q", q, self.nq))
         if self.freedom is not None:
             from .constrained_inverse_dynamics import reduced_mass

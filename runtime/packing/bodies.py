@@ -23,10 +23,10 @@ from ..flexible.kernel_inputs import (
 from ..flexible.modal_body import ModalBody
 from . import denavit_hartenberg, frame_placement
 from .coordinate_layout import HingeSlots, Layout
-from .denavit_hartenberg import connection_of
+from .denavit_hartenberg import link_connection
 from .flexible.expansion import ExpandedScene
 from .frame_placement import GROUND, Placement, rigid_parameters
-from .merging.weld_geometry import end_of
+from .merging.weld_geometry import end_pose
 from .merging.welded_bodies import WeldedBodies
 from .scene_elements import Elements, declared_numbers, kernel_type
 from .system import Arrays, BodyNumbers, BodyRun, ModalNumbers, Numbers, SectionNumbers
@@ -96,7 +96,7 @@ class Bodies:
         body, hinge = self.scene.bodies[run.body + k], self.scene.hinges[run.hinge + k]
         slots = self.layout.slots(run.hinge + k)
         inboard, outboard = hinge_frames(hinge)
-        own = frame_placement.place(body, run.outboard_end, outboard)
+        own = frame_placement.body_placement(body, run.outboard_end, outboard)
         flexible = self.expanded.is_node(body.name)
         child = self._child(run, k) if self.align and not flexible else None
         place = denavit_hartenberg.align_frame(own, hinge, child)
@@ -150,20 +150,20 @@ class Bodies:
         hinge = self.scene.hinges[run.hinge + k]
         parent, parent_place = self._parent(run, k)
         turned, point = frame_placement.connection(parent_place, parent, hinge, inboard, own)
-        link = denavit_hartenberg.link_of(turned, point) if axial else None
+        link = denavit_hartenberg.link_screws(turned, point) if axial else None
         if link is None:
             return (), (*turned[0], *turned[1], *turned[2], *point)
-        return link, connection_of(link)
+        return link, link_connection(link)
 
     def _child(self, run: BodyRow, k: int) -> tuple[Hinge, Pose] | None:
         """First hinge on a body, and where the end that it hangs on lies in the body's axes."""
         if k + 1 < run.count:
             body, end = self.scene.bodies[run.body + k], run.ends[k % len(run.ends)]
-            return self.scene.hinges[run.hinge + k + 1], end_of(body, end)
+            return self.scene.hinges[run.hinge + k + 1], end_pose(body, end)
         found = self._first_children.get(run.place + k)
         if found is None:
             return None
-        held = end_of(self.scene.bodies[found.on], found.inboard_end)
+        held = end_pose(self.scene.bodies[found.on], found.inboard_end)
         pose = self.carried.poses.get(found.on)
         return self.scene.hinges[found.hinge], held if pose is None else pose.then(held)
 

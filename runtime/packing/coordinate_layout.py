@@ -20,7 +20,7 @@ _DENSE = 20_000
 OF_CONSTRAINT = "/constraint"
 
 
-def refuse_dense(nu: int, what: str) -> None:
+def check_dense_size(nu: int, what: str) -> None:
     """SceneError if `what`, a dense matrix with a row and a column per speed, is too large."""
     if nu > _DENSE:
         raise SceneError(

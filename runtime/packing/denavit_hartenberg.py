@@ -97,7 +97,7 @@ def _direction(x: float, y: float) -> tuple[float, float]:
     return snap(x / size), snap(y / size)
 
 
-def link_of(rotation: Matrix, position: Vector) -> Link | None:
+def link_screws(rotation: Matrix, position: Vector) -> Link | None:
     """Screw about x and constant part of the one about z that make up a connection, if they do."""
     size = norm(position)
     sine, cosine = snap(-rotation[1][2]), snap(rotation[2][2])
@@ -111,7 +111,7 @@ def link_of(rotation: Matrix, position: Vector) -> Link | None:
     return cosine, sine, a, angle, snap(shift, size) if size else 0.0
 
 
-def connection_of(link: Link) -> tuple[float, ...]:
+def link_connection(link: Link) -> tuple[float, ...]:
     """Rt (9) and ro (3) of a link at q = 0."""
     c, s, a, angle, d = link
     x: Matrix = ((1.0, 0.0, 0.0), (0.0, c, -s), (0.0, s, c))

@@ -40,7 +40,7 @@ class Placement:
 GROUND = Placement(IDENTITY, (0.0, 0.0, 0.0))
 
 
-def place(body: Body, end: str, outboard: Matrix) -> Placement:
+def body_placement(body: Body, end: str, outboard: Matrix) -> Placement:
     """Internal frame of a body held at `end` by a hinge with outboard axes `outboard`."""
     return Placement(product(body.end_rotation(end), outboard), body.end_position(end))
 

@@ -33,7 +33,7 @@ class Draft(NamedTuple):
     axes: Numbers = ()
 
 
-def laws_of(
+def law_runs(
     scene: Scene, topology: Topology, layout: Layout, values: Values, memory: int
 ) -> Iterator[LawRun]:
     """The laws of every run that has some; those that remember turns do so from `memory` on.

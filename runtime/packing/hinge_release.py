@@ -5,7 +5,7 @@ from __future__ import annotations
 from mstmm.scene import Scene
 
 
-def releasable(scene: Scene) -> list[str]:
+def releasable_hinges(scene: Scene) -> list[str]:
     """Hinges that let go during the run, by their own `release` or by an event."""
     names = [h.name for h in scene.hinge if h.release is not None]
     for event in scene.event:
@@ -14,7 +14,7 @@ def releasable(scene: Scene) -> list[str]:
     return names
 
 
-def let_go_before(scene: Scene, t: float) -> list[str]:
+def hinges_released_by_time(scene: Scene, t: float) -> list[str]:
     """Those that are free at t (s) whatever has happened: by conditions of time alone."""
     own = [(h.name, h.release) for h in scene.hinge if h.release is not None]
     events = [(str(e.hinge), e.when) for e in scene.event if e.do == "release"]

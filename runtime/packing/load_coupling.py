@@ -39,7 +39,7 @@ class Reach:
     heard: tuple[frozenset[int], ...]
 
 
-def reach_of(system: System) -> Reach:
+def load_coupling(system: System) -> Reach:
     """What the loads of a system reach."""
     heard = _heard(system)
     told = [frozenset().union(*(heard[k] for k in _values_of(load))) for load in system.loads]

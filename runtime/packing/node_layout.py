@@ -15,7 +15,9 @@ from .scene_elements import LETS_GO, Elements, kernel_type
 Texts = tuple[str, ...]
 
 
-def layout_of(expanded: ExpandedScene, releases: Mapping[str, int], elements: Elements) -> Layout:
+def build_layout(
+    expanded: ExpandedScene, releases: Mapping[str, int], elements: Elements
+) -> Layout:
     """Places of all hinges in q and u: the scene's hinges, those of its chains, then the modes."""
     scene = expanded.scene
     groups: list[Group] = []

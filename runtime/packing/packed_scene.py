@@ -92,7 +92,7 @@ class PackedScene(Frames):
         )
 
 
-def resize(packed: PackedScene, slots: int) -> None:
+def resize_workspace(packed: PackedScene, slots: int) -> None:
     """Room for tapes of `slots` numbers behind the blocks."""
     system, model = packed.system, packed.model
     packed.tape_slots = max(packed.tape_slots, slots)
@@ -103,7 +103,7 @@ def resize(packed: PackedScene, slots: int) -> None:
     model.workspace = packed.workspace
 
 
-def refine(packed: PackedScene, times: int) -> None:
+def enable_refinement(packed: PackedScene, times: int) -> None:
     """Let the packed tree refine its accelerations so often, by an answer behind the blocks, before
     it is resized; closed loops have room for theirs, and say themselves how often."""
     if packed.system.closes:

@@ -44,7 +44,7 @@ _ROUNDING = 1e-12
 _PART = re.compile(r"[^.\[\]]+|\[\d+\]")
 
 
-def slopes(
+def parameter_derivatives(
     scene: Scene, known: Known, names: Sequence[str], judged: PackedScene | None = None
 ) -> tuple[Structure, Array, Array]:
     """(structure, p, dp/dnames) with p (np,) and its slopes (np, names).
@@ -53,7 +53,7 @@ def slopes(
     moves is a place in p; of closed loops it has the rows that are left where they are `judged`.
     Raises SceneError for a name that the scene does not have, and for numbers of flexible bodies.
     """
-    refuse_folded(scene, names, "exact derivative; take a difference of two models")
+    reject_folded_parameters(scene, names, "exact derivative; take a difference of two models")
 
     def dual(value: Any, k: int) -> Dual:
         return Dual(value_of(value), {**getattr(value, "slope", {}), k: 1.0})
@@ -95,7 +95,7 @@ def seed_derivatives(
     return system, found
 
 
-def refuse_folded(scene: Scene, names: Sequence[str], lacking: str) -> None:
+def reject_folded_parameters(scene: Scene, names: Sequence[str], lacking: str) -> None:
     """Named constants, and numbers that go into the shapes of flexible bodies, by quadrature and
     eigenvalues, or into the axes of constraints, and names that the scene does not have:
     SceneError, which says what they are `lacking` and what to do instead."""

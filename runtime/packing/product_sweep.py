@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from mstmm.errors import SceneError
 
-from .loops.unsupported_loops import refuse_beyond_hinges
+from .loops.unsupported_loops import reject_constraints
 
 if TYPE_CHECKING:
     from mstmm.scene import Hinge
@@ -33,7 +33,7 @@ def _kind(hinge: Hinge) -> str | None:
     return PIN if facts.axial else BALL if len(facts.turns) == 3 else None
 
 
-def attach(packed: PackedScene, accuracy: float) -> None:
+def enable_product_sweep(packed: PackedScene, accuracy: float) -> None:
     """Let the packed scene use the product.  SceneError for a scene it has no matrices for."""
     scene, lib = packed.scene, packed.lib
     _refuse(packed)
@@ -81,7 +81,7 @@ def _refuse(packed: PackedScene) -> None:
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(f'"{name}" is flexible; the product runs rigid chains only; {way_out}')
-    refuse_beyond_hinges(packed, 'sweep = "product"', way_out)
+    reject_constraints(packed, 'sweep = "product"', way_out)
     hinges = _along_chain(packed)
     for hinge in hinges:
         if _kind(hinge) is None:

@@ -10,7 +10,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 
 from ..integrate.steppers import EXPLICIT_METHODS
-from .loops.unsupported_loops import refuse
+from .loops.unsupported_loops import reject_loops
 
 if TYPE_CHECKING:
     from .packed_scene import PackedScene
@@ -22,14 +22,14 @@ _NEGATIVE = -1e-11
 _UPPER = np.triu_indices(6)
 
 
-def attach(packed: PackedScene) -> None:
+def enable_qr_sweep(packed: PackedScene) -> None:
     """Let the packed scene use it.
 
     Raises SceneError for flexible bodies, whose modes it has no rows for, and for bodies with
     negative moments of inertia, which no rows have.
     """
     way_out = 'use sweep = "riccati"'
-    refuse(packed, 'sweep = "qr"', way_out)
+    reject_loops(packed, 'sweep = "qr"', way_out)
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(
@@ -69,7 +69,7 @@ def _least(matrix: Array) -> float:
     return float(np.linalg.eigvalsh(matrix / np.outer(root, root))[0])
 
 
-def refuse_steps(packed: PackedScene) -> None:
+def reject_qr_steps(packed: PackedScene) -> None:
     """SceneError for steps that are not made from accelerations: the tangent of an implicit method
     and the classical matrices lose the digits again that this sweep keeps."""
     if packed.qr:

@@ -11,8 +11,8 @@ from ..flexible.modal_body import ModalBody
 from ..kernels import prebuilt_kernels
 from . import product_sweep, qr_sweep
 from .merging.simplification import LINKED, WELDS, Words
-from .packed_scene import PackedScene, refine, resize
-from .records.model_record import write
+from .packed_scene import PackedScene, enable_refinement, resize_workspace
+from .records.model_record import write_model
 from .scene_elements import Known
 from .scene_frames import Frames
 from .system import System
@@ -38,12 +38,12 @@ def pack(
     system, frames = system_of(scene, known, align=align, flexible=flexible, simplify=simplify)
     packed = packed_system(system, frames)
     if product_accuracy is not None and not system.closes:  # closed loops go first
-        product_sweep.attach(packed, product_accuracy)
+        product_sweep.enable_product_sweep(packed, product_accuracy)
     if sweep == "qr":
-        qr_sweep.attach(packed)
+        qr_sweep.enable_qr_sweep(packed)
     if sweep == "refined":
-        refine(packed, 1)
-    resize(packed, packed.written.slots)
+        enable_refinement(packed, 1)
+    resize_workspace(packed, packed.written.slots)
     return packed
 
 
@@ -70,21 +70,21 @@ def without_merging(packed: PackedScene) -> PackedScene:
     found = packed_system(same, frames)
     found.held = packed.held
     if packed.qr:
-        qr_sweep.attach(found)
+        qr_sweep.enable_qr_sweep(found)
     if packed.refined:
-        refine(found, int(packed.model.refines))
-    resize(found, found.written.slots)
+        enable_refinement(found, int(packed.model.refines))
+    resize_workspace(found, found.written.slots)
     return found
 
 
 def packed_system(system: System, frames: Frames) -> PackedScene:
     """Engine arrays of a system, such as one whose forces are others than the scene's."""
     ffi, lib = prebuilt_kernels.module()
-    written = write(system, frames.elements)
+    written = write_model(system, frames.elements)
     about = {field.name: getattr(frames, field.name) for field in fields(Frames)}
     packed = PackedScene(
         **about, system=system, ffi=ffi, lib=lib, model=written.model, written=written,
         scratch=written.scratch,
     )  # fmt: skip
-    resize(packed, written.slots)  # tapes of events are laid out later and may need more
+    resize_workspace(packed, written.slots)  # tapes of events are laid out later and may need more
     return packed

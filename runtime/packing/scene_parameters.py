@@ -31,7 +31,7 @@ _INDEX = re.compile(r"(.*)\[(\d+)\]")
 _EVERY = re.compile(r"\[\d+\]")
 
 
-def data_of(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
+def scene_data(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
     """The scene as a file has it, without the ends that every beam has of itself; `evaluated`, with
     numbers alone for what is written as expressions of named constants."""
     data = tomllib.loads(to_toml(scene, evaluated))
@@ -61,7 +61,7 @@ def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
 
 def scene_parameters(scene: Scene) -> dict[str, float]:
     """Every number by its name, in the scene's order."""
-    data = data_of(scene, evaluated=True)
+    data = scene_data(scene, evaluated=True)
     found = dict(_numbers("constants", data.get("constants", {})))
     found.update(_numbers("gravity", data["gravity"]))
     for name, element in _named(data):
@@ -77,7 +77,7 @@ def with_parameters(scene: Scene, changes: Mapping[str, float]) -> Scene:
     pattern: "rope.body.mass".  Raises SceneError for unknown names and for values that the scene
     refuses.
     """
-    data = data_of(scene)
+    data = scene_data(scene)
     there: dict[str, float] | None = None
     given_as, together = dict[str, str](), dict[str, list[str]]()
     for path, given in mapping_by_name("parameters", changes).items():
@@ -98,7 +98,7 @@ def with_parameters(scene: Scene, changes: Mapping[str, float]) -> Scene:
     for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
-    return made_of(data, scene)
+    return scene_from_data(data, scene)
 
 
 def _meets(name: str, other: str) -> bool:
@@ -115,7 +115,7 @@ def _meant(name: str, there: Mapping[str, float] | None) -> set[str]:
     return {one for one in there or () if _meets(name, one)} or {name}
 
 
-def made_of(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:
+def scene_from_data(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:
     """The scene that data like those of another one are, validated afresh; `where` begins every
     message."""
     _begin_driven(data)

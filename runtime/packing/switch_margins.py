@@ -24,7 +24,7 @@ from ..discontinuities.active_expressions import (
 from ..discontinuities.interval_enclosures import terms_of_time
 from .coordinate_layout import Layout
 from .expression_tapes import Resolver, event_tape, resolver
-from .records.bounce_records import Bounce, bounces
+from .records.bounce_records import Bounce, build_bounces
 
 #: Margins at most: every one is looked at several times a step.
 MOST = 1000
@@ -57,14 +57,14 @@ def event_order(scene: Scene, layout: Layout, held: Collection[str] = ()) -> Wat
     """Events in the order of the file, hard stops, releases, then switches; `held` are inputs that
     are set during the run."""
     graph, probes = Graph(), Probes()
-    found = switches(scene, layout, graph, probes, held)
+    found = state_switches(scene, layout, graph, probes, held)
     conditions: list[tuple[Expression, Hinge | None]] = [(e.when, None) for e in scene.events]
     conditions += [(h.release, h) for h in scene.hinge if h.release is not None]
     if not conditions and not found:
         return Watched(None, (), ())
     margins = [switch.margin for switch in found[:MOST]]
     tape = event_tape(conditions, layout, graph, probes, margins)
-    thrown = bounces(scene, layout, dict(probes))
+    thrown = build_bounces(scene, layout, dict(probes))
     return Watched(tape, tuple(probes), tuple(found), thrown)
 
 
@@ -73,7 +73,7 @@ def has_switches(scene: Scene) -> bool:
     return any(_terms(one) for one in active_expressions(scene))
 
 
-def switches(
+def state_switches(
     scene: Scene, layout: Layout, graph: Graph, probes: Probes, held: Collection[str]
 ) -> list[Switch]:
     """All margins that depend on the state, each once and no more than MOST + 1; positions of ends

@@ -21,19 +21,19 @@ from ..kernels.c_records import Lookup
 from .bodies import Bodies
 from .expression_tapes import MOVING, Values, drive_kernel
 from .flexible.expansion import ExpandedScene, expand
-from .force_elements.collection import forces_of
-from .hinge_laws import laws_of
-from .hinge_release import releasable
-from .loops.closures import closures_of
-from .loops.coupling_numbers import couplings_of
-from .loops.curve_constraints import elements_of
+from .force_elements.collection import force_element_numbers
+from .hinge_laws import law_runs
+from .hinge_release import releasable_hinges
+from .loops.closures import closure_numbers
+from .loops.coupling_numbers import coupling_numbers
+from .loops.curve_constraints import curve_elements
 from .loops.cut_tree import cut_loops
-from .loops.loop_detection import may_close
+from .loops.loop_detection import may_have_loops
 from .merging import link_detection
-from .merging.right_angle_snapping import with_exact_turns
+from .merging.right_angle_snapping import with_right_angles
 from .merging.simplification import LINKED, LINKS, TURNS, WELDS, Simplification, Words
-from .merging.welded_bodies import WeldedBodies, carried_in, contract_tree
-from .node_layout import layout_of
+from .merging.welded_bodies import WeldedBodies, contract_tree, find_welded_bodies
+from .node_layout import build_layout
 from .scene_elements import Elements, Known
 from .scene_frames import Frames
 from .system import HeldInputs, LoadNumbers, Numbers, System
@@ -79,15 +79,15 @@ def system_of(
     Raises SceneError for hinges that do not form a tree or types that nobody defines.
     """
     expanded, told = _with_exact_turns(expansion_of(scene, flexible), simplify)
-    elements = Elements({**(known or {}), **elements_of(scene.constraint)})
+    elements = Elements({**(known or {}), **curve_elements(scene.constraint)})
     nodes, tree = expanded.scene, build_topology(expanded.scene)
-    carried = carried_in(expanded, tree) if WELDS in simplify else WeldedBodies()
+    carried = find_welded_bodies(expanded, tree) if WELDS in simplify else WeldedBodies()
     tree = contract_tree(tree, carried)
-    releases = {name: i for i, name in enumerate(releasable(scene))}
-    layout = layout_of(expanded, releases, elements)
+    releases = {name: i for i, name in enumerate(releasable_hinges(scene))}
+    layout = build_layout(expanded, releases, elements)
     bodies = Bodies(expanded, tree, layout, elements, releases, align, LINKS in simplify, carried)
     runs = tuple(map(bodies.run, tree.runs))
-    if not may_close(scene):
+    if not may_have_loops(scene):
         told += link_detection.link_simplifications(
             runs, (nodes.hinges.name(run.hinge) for run in tree.runs)
         )
@@ -99,20 +99,20 @@ def system_of(
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven(nodes, tree)), Values(layout, ports)
     remembered = len(releases) + sum(event.do == "bounce" for event in scene.events)
-    strained = remembered if may_close(scene) else -1
+    strained = remembered if may_have_loops(scene) else -1
     remembered += strained >= 0
-    laws = tuple(laws_of(nodes, tree, layout, values, remembered))
+    laws = tuple(law_runs(nodes, tree, layout, values, remembered))
     loads = tuple(_load(frames, load, values) for load in nodes.load)
     held = _held(scene, laws[-1].next_twist if laws else remembered)
-    couplings, coupled = couplings_of(frames, runs)
+    couplings, coupled = coupling_numbers(frames, runs)
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), strained, nodes.gravity, runs,
-        laws, loads, forces_of(frames, nodes, ports),
+        laws, loads, force_element_numbers(frames, nodes, ports),
         values.kernel() if len(values) else None,
         drive_kernel([drive for _, _, drive in driven], layout, ports) if driven else None,
         tuple((place, k) for place, k, _ in driven), tuple(scene.channels.values()),
-        held, by_time(nodes, nodes.channels), moving or {}, tuple(closures_of(frames, runs)),
-        couplings, coupled,
+        held, has_timed_loads(nodes, nodes.channels), moving or {},
+        tuple(closure_numbers(frames, runs)), couplings, coupled,
     )  # fmt: skip
     return system, frames
 
@@ -122,7 +122,7 @@ def _with_exact_turns(
 ) -> tuple[ExpandedScene, list[Simplification]]:
     scene, told = expanded.scene, list[Simplification]()
     if TURNS in simplify:
-        scene, told = with_exact_turns(scene, simplify[TURNS])
+        scene, told = with_right_angles(scene, simplify[TURNS])
     return (replace(expanded, scene=scene) if told else expanded), told
 
 
@@ -138,7 +138,7 @@ def _held(scene: Scene, first: int) -> HeldInputs:
     return HeldInputs(first, tuple(places.values()), tuple(start))
 
 
-def by_time(scene: Scene, inputs: Inputs) -> bool:
+def has_timed_loads(scene: Scene, inputs: Inputs) -> bool:
     """Whether an effort or load names the time, or an input that does not stand still."""
     loads = (one for one in active_expressions(scene) if not (one.drive or one.condition))
     names = {name.text for one in loads for name in one.expression.names}

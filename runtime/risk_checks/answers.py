@@ -15,7 +15,7 @@ from mstmm.risk import Risk
 
 from ..integrate.settings import Settings
 from ..result.factory import result_of
-from .driven_path import states
+from .driven_path import driven_states
 from .pre_run import check_before_run
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def find_state_risks(model: CompiledScene, t: float, q: Array, u: Array) -> tupl
     """Risks of the state q (nq,), u (nu,) at t (s): of its models, its sweep and its loops."""
     settings = Settings(t, t)
     start = check_before_run(model, settings, q, u)
-    return result_of(model, start.given(states(model, settings, q, u, [t]), q, u)).risks
+    return result_of(model, start.given(driven_states(model, settings, q, u, [t]), q, u)).risks
 
 
 def merge_over_values(

@@ -10,14 +10,14 @@ from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
 from ..result.conditioning import may_be_singular, singular_distance
-from .driven_path import states, times
+from .driven_path import drive_times, driven_states
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..integrate.settings import Settings
 
 
-def concerns(model: CompiledScene) -> bool:
+def applies_to(model: CompiledScene) -> bool:
     """Whether coordinates of a hinge fail anywhere."""
     return may_be_singular(model)
 
@@ -26,7 +26,7 @@ def coordinate_singularity_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
     """The nearest of them, at the start and where drives go."""
-    moved = states(model, settings, q, u, times(model, settings))
+    moved = driven_states(model, settings, q, u, drive_times(model, settings))
     found = singular_distance(model, moved)
     if found is not None and found.risk is not None:
         yield replace(found.risk, before=True)

@@ -22,13 +22,13 @@ _TIMES = 65
 _NOTHING = Statistics(0, 0, 0, 0, None, None, None, None, 0.0, 0.0, False, 0)
 
 
-def times(model: CompiledScene, settings: Settings) -> list[float]:
+def drive_times(model: CompiledScene, settings: Settings) -> list[float]:
     """The start, and times up to the end (s) where there are drives."""
     moves = model.packed.system.driven and settings.t_end > settings.t_start
     return np.linspace(settings.t_start, settings.t_end, _TIMES if moves else 1).tolist()
 
 
-def states(
+def driven_states(
     model: CompiledScene, settings: Settings, q: Array, u: Array, at: Sequence[float]
 ) -> Trajectory:
     """The states at some times (s) if only what is driven moved, as a trajectory."""

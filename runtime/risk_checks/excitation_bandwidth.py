@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _FASTER = 1.5
 
 
-def concerns(model: CompiledScene) -> bool:
+def applies_to(model: CompiledScene) -> bool:
     """Whether there are any."""
     return bool(model.flexible)
 

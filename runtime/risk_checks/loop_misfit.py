@@ -20,7 +20,7 @@ MISFIT_REMEDY = (
 )
 
 
-def concerns(model: CompiledScene) -> bool:
+def applies_to(model: CompiledScene) -> bool:
     """Whether rows that are left out leave more than rounding."""
     return model.closed is not None and model.closed.loops.misfit[0] > 0.0
 

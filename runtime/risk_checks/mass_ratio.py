@@ -12,7 +12,7 @@ from mstmm.risk import Risk
 from ..integrate.settings import Settings
 from ..packing.initial_state import start_values
 from ..result.conditioning import MAX_PIVOT_LOSS, pivot_loss
-from .driven_path import states
+from .driven_path import driven_states
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
@@ -26,7 +26,7 @@ _WORST = 1e3
 _MOST = 2000
 
 
-def concerns(model: CompiledScene) -> bool:
+def applies_to(model: CompiledScene) -> bool:
     """Whether masses are so unlike that digits may be lost."""
     if model.packed.qr or model.packed.system.closes:
         return False
@@ -37,7 +37,7 @@ def mass_ratio_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
     """The worst loss of the start's sweep."""
-    found = pivot_loss(model, states(model, settings, q, u, [settings.t_start]))
+    found = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
     if found is not None and found.risk is not None:
         yield replace(found.risk, before=True)
 
@@ -45,11 +45,11 @@ def mass_ratio_risks(
 def accurate_sweep(model: CompiledScene) -> str:
     """Of a model made with "riccati" the cheapest sweep by which its start keeps its digits:
     "riccati", "refined" or "qr"."""
-    if not concerns(model):
+    if not applies_to(model):
         return "riccati"
     packed, settings = model.packed, Settings(0.0)
     q, u = start_values(packed.scene, packed.layout, packed.flexible)
-    found = pivot_loss(model, states(model, settings, q, u, [settings.t_start]))
+    found = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
     return "riccati" if found is None or found.risk is None else found.sweep
 
 

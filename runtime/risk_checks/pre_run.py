@@ -31,13 +31,13 @@ Guard = Callable[["CompiledScene", "Settings", Array, Array], Iterable[Risk]]
 
 #: Whether a scene gives reason to look, and what looks.
 _GUARDS: tuple[tuple[Callable[[CompiledScene], bool], Guard], ...] = (
-    (mass_ratio.concerns, mass_ratio.mass_ratio_risks),
-    (coordinate_singularity.concerns, coordinate_singularity.coordinate_singularity_risks),
+    (mass_ratio.applies_to, mass_ratio.mass_ratio_risks),
+    (coordinate_singularity.applies_to, coordinate_singularity.coordinate_singularity_risks),
     (spin_stiffening.has_linear_bodies, spin_stiffening.spin_stiffening_risks),
-    (excitation_bandwidth.concerns, excitation_bandwidth.excitation_bandwidth_risks),
-    (stiffness.concerns, stiffness.explicit_step_count_risks),
+    (excitation_bandwidth.applies_to, excitation_bandwidth.excitation_bandwidth_risks),
+    (stiffness.applies_to, stiffness.explicit_step_count_risks),
     (singular_start.applies_to, singular_start.singular_start_risks),
-    (loop_misfit.concerns, loop_misfit.loop_misfit_risks),
+    (loop_misfit.applies_to, loop_misfit.loop_misfit_risks),
 )
 
 #: The guards that the scene of a model gives reason for, found before its first run.

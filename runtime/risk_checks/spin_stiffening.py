@@ -18,7 +18,7 @@ from ..result.flexible.modal_energy import modal_frequencies
 from ..result.flexible.range_estimators import has_second_order_terms, transverse_spin
 from ..result.flexible.risks import MAX_LOAD_RATIO
 from ..result.observations import Observations
-from .driven_path import states, times
+from .driven_path import drive_times, driven_states
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
@@ -38,7 +38,7 @@ def spin_stiffening_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
     """Those whose stiffness a spin that is known before the run changes by more than GAMMA."""
-    moved = states(model, settings, q, u, times(model, settings))
+    moved = driven_states(model, settings, q, u, drive_times(model, settings))
     bodies = FlexibleBodies(model, Observations(model, moved))
     for name in _linear(model):
         first = float(modal_frequencies(model.flexible[name])[0])

@@ -30,7 +30,7 @@ _MANY = 2e4
 _PARTS = 4
 
 
-def concerns(model: CompiledScene) -> bool:
+def applies_to(model: CompiledScene) -> bool:
     """Whether there are any."""
     return _may_be(model, 0.0)
 

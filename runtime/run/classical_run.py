@@ -27,8 +27,8 @@ from ..classical.state_conversion import StateConversion, start_movements
 from ..integrate.c_loop import Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..packing.flexible.expansion import HELD
-from ..packing.loops.unsupported_loops import refuse
-from ..packing.qr_sweep import refuse_steps
+from ..packing.loops.unsupported_loops import reject_loops
+from ..packing.qr_sweep import reject_qr_steps
 from ..platform_support.interrupts import record_interrupts
 from .integration_run import LARGEST, SLICE, split
 from .scene_system import SceneSystem
@@ -58,11 +58,11 @@ def integrate(
             f'controller "{one.name}": method "{settings.method}" has no samples; take another one'
         )
     parse_scheme(settings.scheme)
-    refuse(
+    reject_loops(
         model.packed, f'method "{settings.method}"',
         "its sources state it for chains and trees alone; genalpha and rodas4p2 do",
     )  # fmt: skip
-    refuse_steps(model.packed)
+    reject_qr_steps(model.packed)
     return _Run(model, settings, tell).run(q, u)
 
 

@@ -17,7 +17,7 @@ from ..integrate.c_loop import Integrator, Samples, Statistics, Status
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO, Tableau, check_steps, get
 from ..integrate.steppers.implicit_methods import NewmarkFamily
-from ..packing.loops.unsupported_loops import refuse_method, refuse_of_speeds
+from ..packing.loops.unsupported_loops import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
 from .method_switching import Choice
 from .run_notes import chattering_note, step_too_long_note, unseen
@@ -63,9 +63,9 @@ def initial_method(system: SceneSystem, settings: Settings) -> Tableau:
     """The method by which a run begins, of a system that has what it asks for."""
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
-        refuse_method(system.engine.packed, settings.method, settings.tangent)
+        reject_loop_method(system.engine.packed, settings.method, settings.tangent)
         if asks_positions(settings):
-            refuse_of_speeds(system.engine.packed, settings.method)
+            reject_speed_constraints(system.engine.packed, settings.method)
         system.offer_tangent()
     check_steps(tableau, settings.step)
     return tableau

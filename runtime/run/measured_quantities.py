@@ -31,7 +31,7 @@ from ..engine.observation_columns import (
 from ..kernels.tape_kernel import c_tape
 from ..packing.coordinate_layout import HingeSlots
 from ..packing.expression_tapes import inputs_port, state_ports
-from ..packing.packed_scene import PackedScene, resize
+from ..packing.packed_scene import PackedScene, resize_workspace
 
 #: Where a number stands: the port of the tape and the place in it.
 Place = tuple[str, int]
@@ -68,7 +68,7 @@ class MeasuredQuantities:
             "measured", ports, [Port("values", (len(nodes),))], {"values": nodes}
         )
         tape, self._kept = compile_tape(kernel), list[object]()
-        resize(packed, tape.slots)
+        resize_workspace(packed, tape.slots)
         self.record = ffi.new("mstmm_measure *")
         self.record.tape, self.record.observes = c_tape(ffi, tape, self._kept), bool(self._read)
         shown = self.record.shown

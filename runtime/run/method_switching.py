@@ -18,7 +18,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..integrate.c_loop import Integrator
 from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO_EXPLICIT, get
-from ..packing.qr_sweep import refuse_steps
+from ..packing.qr_sweep import reject_qr_steps
 from .method_segments import MethodSegment, from_rows
 from .scene_system import SceneSystem
 from .spectral_radius import FastestMode
@@ -85,7 +85,7 @@ class Choice:
         system, engine = self._system, self._system.engine
         if self._fastest is None:
             try:
-                refuse_steps(engine.packed)
+                reject_qr_steps(engine.packed)
                 self._fastest = FastestMode(engine, system.memory)
             except SceneError as error:
                 self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, f"stays: {error}"))

@@ -22,9 +22,9 @@ from ..engine.tangent_matrix import TangentMatrix
 from ..kernels.fused_library import FusedLibrary
 from ..kernels.tape_kernel import c_tape
 from ..packing.coordinate_layout import StateNames
-from ..packing.hinge_release import let_go_before
-from ..packing.packed_scene import resize
-from ..packing.qr_sweep import refuse_steps
+from ..packing.hinge_release import hinges_released_by_time
+from ..packing.packed_scene import resize_workspace
+from ..packing.qr_sweep import reject_qr_steps
 from ..packing.records.bounce_records import Bounce
 from ..packing.switch_margins import MOST
 from .c_controllers import Controllers
@@ -104,7 +104,7 @@ class SceneSystem:
         engine, run = self.engine, self.run
         if self.system.implicit:
             return
-        refuse_steps(engine.packed)
+        reject_qr_steps(engine.packed)
         base = TangentMatrix(engine, self.memory)
         stage, size = engine.ffi.new("mstmm_tangent *", base.record[0]), engine.nq + 2 * engine.nu
         work = np.zeros(engine.lib.mstmm_residual_work(engine.packed.model))
@@ -151,7 +151,7 @@ class SceneSystem:
         self, tape: Tape, ends: Sequence[tuple[str, str]], actions: list[tuple[int, int]]
     ) -> None:
         engine, ffi, run = self.engine, self.engine.ffi, self.run
-        resize(engine.packed, tape.slots)
+        resize_workspace(engine.packed, tape.slots)
         run.event_tape = c_tape(ffi, tape, self.kept)
         probes = [Probe(*engine.packed.end(b + (f".{e}" if e else ""))) for b, e in ends]
         records = engine.probes(probes)
@@ -179,7 +179,7 @@ class SceneSystem:
 
     def _bounce(self, record: Any, bounce: Bounce) -> None:
         engine, ffi = self.engine, self.engine.ffi
-        resize(engine.packed, bounce.slopes.slots)
+        resize_workspace(engine.packed, bounce.slopes.slots)
         places = np.array([bounce.places], dtype=np.int32).reshape(-1)
         numbers = np.zeros(1 + len(bounce.places) + 4 * engine.nu)
         record.slopes = c_tape(ffi, bounce.slopes, self.kept)
@@ -235,7 +235,7 @@ class SceneSystem:
         )
         y = np.ascontiguousarray(y)
         packed, run = self.engine.packed, self.run
-        for name in let_go_before(packed.scene, t) if packed.releases else ():
+        for name in hinges_released_by_time(packed.scene, t) if packed.releases else ():
             self.memory[packed.releases[name]] = 1.0
         run.failure.reason = 0  # of another state that did not close
         run.on_positions = 0  # no start slips, whatever the steps of this system's last run left

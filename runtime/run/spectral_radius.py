@@ -21,7 +21,7 @@ from mstmm.scene import Scene
 from ..engine.eigenvalues import eigenvalues
 from ..engine.looped_engine import LoopedEngine
 from ..engine.tangent_matrix import TangentMatrix
-from ..packing.qr_sweep import refuse_steps
+from ..packing.qr_sweep import reject_qr_steps
 
 #: Power iterations; the first one is in the choice of their start.
 _ITERATIONS = 4
@@ -67,7 +67,7 @@ def fastest_at_start(engine: LoopedEngine, t: float, q: Array, u: Array) -> floa
     Raises SceneError for scenes that implicit steps cannot follow, NumericalFailure where the state
     cannot be evaluated.
     """
-    refuse_steps(engine.packed)
+    reject_qr_steps(engine.packed)
     memory, y = engine.start_memory(), np.concatenate([q, u])
     if len(y) > _FEW:
         return FastestMode(engine, memory).rate(t, q, u)

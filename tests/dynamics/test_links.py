@@ -19,7 +19,7 @@ import mstmm
 from mstmm.runtime.engine.engine_calls import Observation
 from mstmm.runtime.engine.looped_engine import LoopedEngine
 from mstmm.runtime.packing.packed_scene import PackedScene
-from mstmm.runtime.packing.records.body_records import link_of
+from mstmm.runtime.packing.records.body_records import link_kernel
 from mstmm.runtime.packing.scene_packing import pack
 
 AXIAL = ("pin", "prismatic", "cylindrical", "screw")
@@ -114,8 +114,8 @@ def test_balls_with_rotors_are_no_links(rng: np.random.Generator) -> None:
 
 def test_balls_of_the_users_are_no_links() -> None:
     body = packed(chain(["ball"])).system.body(0)
-    assert link_of(body) == "link_ball"
-    assert link_of(replace(body, hinge=("hinge", "socket"))) == ""
+    assert link_kernel(body) == "link_ball"
+    assert link_kernel(replace(body, hinge=("hinge", "socket"))) == ""
 
 
 def test_a_ball_on_a_thin_rod_is_named_where_links_sweep_it() -> None:

@@ -18,7 +18,7 @@ from mstmm.numerics import rotations
 from mstmm.numerics.dual import Dual, atan2, hypot
 from mstmm.runtime.packing import scene_parameters
 from mstmm.runtime.packing.fused_structure import structure_of
-from mstmm.runtime.packing.parameter_derivatives import slopes
+from mstmm.runtime.packing.parameter_derivatives import parameter_derivatives
 from mstmm.runtime.packing.system_builder import system_of
 
 TIME = 0.3
@@ -58,7 +58,7 @@ def test_numbers_of_the_kernel_to_rounding(seed: int) -> None:
     names = np.random.default_rng(seed).permutation([n for n in values if "initial" not in n])
     checked = 0
     for name in names[:25]:
-        _, p, moved = slopes(scene, {}, [name])
+        _, p, moved = parameter_derivatives(scene, {}, [name])
 
         def shifted(change: float, name: str = name, size: int = len(p)) -> Array:
             try:
@@ -198,7 +198,7 @@ def test_a_number_inside_an_expression_is_refused() -> None:
     rod = {"name": "rod", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}
     scene = mstmm.Scene(gravity=[0, 0, 0], body=[rod], hinge=[hinge])
     with pytest.raises(SceneError, match="an effort of the hinge is written with it"):
-        slopes(scene, {}, ["own.parameters.gain"])
+        parameter_derivatives(scene, {}, ["own.parameters.gain"])
 
 
 def test_a_huge_number_is_itself() -> None:
@@ -207,7 +207,7 @@ def test_a_huge_number_is_itself() -> None:
     hinge = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod",
              "law": {"stiffness": [2.0**1000]}}  # fmt: skip
     scene = mstmm.Scene(gravity=[0, 0, 0], body=[rod], hinge=[hinge])
-    _, p, moved = slopes(scene, {}, ["rod.mass", "pin.law.stiffness[0]"])
+    _, p, moved = parameter_derivatives(scene, {}, ["rod.mass", "pin.law.stiffness[0]"])
     place = p.tolist().index(2.0**1000)
     assert moved[place].tolist() == [0.0, 1.0]
     assert sorted(moved[:, 0]) == [*[0.0] * (len(p) - 4), 0.25, 0.25, 0.5, 1.0]
@@ -220,8 +220,8 @@ def test_a_number_may_be_named_twice() -> None:
              "law": {"effort": "-1.5", "damping": 0.2}}  # fmt: skip
     scene = mstmm.Scene(gravity=[0, 0, 0], body=[rod], hinge=[hinge])
     for name in ("pin.law.effort", "pin.law.damping", "rod.mass"):
-        _, p, moved = slopes(scene, {}, [name, name])
-        _, alone, once = slopes(scene, {}, [name])
+        _, p, moved = parameter_derivatives(scene, {}, [name, name])
+        _, alone, once = parameter_derivatives(scene, {}, [name])
         assert p.tolist() == alone.tolist()
         assert (moved == once).all() and once.any()
 

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 import mstmm
 from mstmm.cli.app import app
 from mstmm.numerics.rotations import from_rpy, to_quaternion
-from mstmm.runtime.packing.merging.right_angle_snapping import quarter_turns
+from mstmm.runtime.packing.merging.right_angle_snapping import nearest_right_angles
 
 ROD = {"mass": 2.0, "center_of_mass": [0.4, 0.1, 0], "inertia": [0.11, 0.2, 0.3]}
 
@@ -78,12 +78,14 @@ def test_every_rotation_by_quarter_turns_is_found() -> None:
     for rpy in product(angles, repeat=3):
         exact = from_rpy(rpy)
         near = from_rpy([x + 2e-12 for x in rpy])
-        found = quarter_turns(near, 1e-11)
+        found = nearest_right_angles(near, 1e-11)
         assert found is not None
         assert np.array_equal(from_rpy(found[0]), exact) and 1e-12 < found[1] < 6e-12
-        assert quarter_turns(exact, 1e-11) is None and quarter_turns(near, 1e-12) is None
+        assert (
+            nearest_right_angles(exact, 1e-11) is None and nearest_right_angles(near, 1e-12) is None
+        )
         assert len(to_quaternion(exact)) == 4
-    assert quarter_turns(from_rpy([0.3, 0, 0]), 0.01) is None
+    assert nearest_right_angles(from_rpy([0.3, 0, 0]), 0.01) is None
 
 
 def test_a_table_leaves_what_it_does_not_name() -> None:

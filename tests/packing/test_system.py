@@ -13,7 +13,7 @@ import mstmm
 from mstmm.runtime.packing import system as records
 from mstmm.runtime.packing.fused_structure import structure_of
 from mstmm.runtime.packing.packed_scene import PackedScene
-from mstmm.runtime.packing.records.body_records import link_of
+from mstmm.runtime.packing.records.body_records import link_kernel
 from mstmm.runtime.packing.scene_packing import pack
 from mstmm.runtime.packing.system import BodyNumbers, System
 from mstmm.runtime.packing.system_builder import system_of
@@ -118,7 +118,7 @@ def test_members_of_a_chain_share_their_numbers() -> None:
 
 def link_numbers(body: BodyNumbers) -> tuple[float, ...]:
     """Numbers of the body, of its rotor and its hinge, and of the way from its parent."""
-    if not link_of(body):
+    if not link_kernel(body):
         return ()
     return (*body.body_p, body.rotor[0], *(body.hinge_p or (0.0,)),
             *(body.link or body.connection))  # fmt: skip

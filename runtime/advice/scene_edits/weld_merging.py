@@ -20,7 +20,13 @@ from mstmm.scene.validators.scalars_and_vectors import GROUND
 from ...chart.model_levels import with_tables
 from ...packing.flexible.rigid_substitution import substitute_rigid_bodies
 from ...packing.merging.referenced_parts import ReferencedParts, referenced_parts
-from ...packing.merging.weld_geometry import end_at, end_of, orientation_of, together, weld_pose
+from ...packing.merging.weld_geometry import (
+    end_pose,
+    merged_body,
+    to_end,
+    to_orientation,
+    weld_pose,
+)
 from ..body_model_levels import RIGID
 from ..measure_renaming import compose_names, rename_reference
 from .chain_expansion import ExpandedScene, expand_chains, short
@@ -198,7 +204,7 @@ def _without(found: MergedScene, weld: Hinge, gone: str, bodies: Mapping[str, Bo
     pose = weld_pose(weld, bodies.get(weld.inboard_body), bodies[weld.outboard_body])
     if gone != weld.outboard_body:
         pose = pose.inverse
-    places = {gone: pose} | {f"{gone}.{end}": pose.then(end_of(part, end)) for end in part.ends}
+    places = {gone: pose} | {f"{gone}.{end}": pose.then(end_pose(part, end)) for end in part.ends}
     scene = with_tables(
         found.scene, hinge=tuple(one for one in found.scene.hinge if one.name != weld.name)
     )
@@ -215,8 +221,8 @@ def _joined(
     ends, names = dict(whole.ends), {}
     for old, pose in places.items():
         own = _free_name(ends, old.replace(".", "_"))
-        ends[own], names[old] = end_at(pose), f"{whole.name}.{own}"
-    body = together(whole, part, places[part.name]).model_copy(update={"ends": ends})
+        ends[own], names[old] = to_end(pose), f"{whole.name}.{own}"
+    body = merged_body(whole, part, places[part.name]).model_copy(update={"ends": ends})
     made = with_names(scene, names)
     others = tuple(one for one in scene.body if one.name != part.name)
     made = with_tables(made, body=tuple(body if one.name == whole.name else one for one in others))
@@ -291,7 +297,7 @@ def _hung(element: Any, rotation: Matrix, places: Mapping[str, Pose]) -> Any:
     return element.model_copy(
         update={
             "inboard": GROUND, "position": held.position,
-            "orientation": orientation_of(held.then(Pose(ZERO, rotation))),
+            "orientation": to_orientation(held.then(Pose(ZERO, rotation))),
         }
     )  # fmt: skip
 

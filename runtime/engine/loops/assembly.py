@@ -16,7 +16,12 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import LoopClosureError, NumericalFailure, SceneError
 
-from ...packing.loops.system_variants import LOCKED, length_of, stiff, with_speeds_prescribed
+from ...packing.loops.system_variants import (
+    LOCKED,
+    characteristic_length,
+    with_speeds_prescribed,
+    with_stiff_modes,
+)
 from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .loop_calls import LoopCalls
@@ -56,7 +61,7 @@ def engine_with_held(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEng
     if not held_places and not packed.flexible:
         return engine
     held_engine = LoopedEngine(
-        packed_system(stiff(with_speeds_prescribed(packed.system, held_places)), packed)
+        packed_system(with_stiff_modes(with_speeds_prescribed(packed.system, held_places)), packed)
     )
     loop_records, own_records = packed.written.loops, held_engine.packed.written.loops
     assert loop_records is not None and own_records is not None
@@ -272,9 +277,9 @@ class Assembly:
         is_coupling = np.zeros(calls.count, bool)
         is_coupling[[closure.row for closure in calls.records.couplings]] = True
         weights, self._turning = np.ones(calls.count), is_angle
-        length = max(1.0, length_of(calls.engine.packed.system))
+        length = max(1.0, characteristic_length(calls.engine.packed.system))
         self._sizes = np.where(is_angle | is_coupling, 1.0, length)
-        self._locks = LOCKED * length_of(calls.engine.packed.system)
+        self._locks = LOCKED * characteristic_length(calls.engine.packed.system)
         for kind in (is_angle, is_coupling, ~(is_angle | is_coupling)):
             if kind.any():
                 weights[kind] = 1.0 / calls.mobility[kind].mean()

@@ -20,7 +20,7 @@ from mstmm.errors import MstmmError
 from mstmm.ir.hinge_properties import default_coordinates
 from mstmm.scene import Hinge, Scene
 
-from ...packing.loops.system_variants import length_of
+from ...packing.loops.system_variants import characteristic_length
 from ...packing.packed_scene import PackedScene
 from ...packing.scene_packing import pack
 from ..looped_engine import LoopedEngine
@@ -65,7 +65,7 @@ class RequestedCoordinates:
     def __init__(
         self, packed: PackedScene, q: Array, kept: Collection[str], stated: bool = True
     ) -> None:
-        self.packed, self.q, self._length = packed, q, length_of(packed.system)
+        self.packed, self.q, self._length = packed, q, characteristic_length(packed.system)
         self.kept = tuple(kept)
         counting_hinges = (
             _hinges_with_initial_state(packed.described) if stated else packed.described.hinge

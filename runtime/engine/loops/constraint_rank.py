@@ -18,7 +18,12 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...packing.loops.system_variants import LOCKED, by_hinges, geometric, length_of
+from ...packing.loops.system_variants import (
+    LOCKED,
+    characteristic_length,
+    with_hinge_inertia,
+    with_unit_masses,
+)
 from ...packing.scene_packing import packed_system, without_merging
 from ..looped_engine import LoopedEngine
 from .loop_calls import REDUNDANT_PIVOT, LoopCalls
@@ -80,7 +85,7 @@ def find_rank(engine: LoopedEngine, q: Array) -> Rank:
         list(redundant_here)
     ]
     states, is_stuck = _states_around(calls, q, redundant_here, pivot_levels)
-    locking_gap = LOCKED * length_of(engine.packed.system)
+    locking_gap = LOCKED * characteristic_length(engine.packed.system)
     is_stuck = is_stuck and not _is_misfit_only(calls, q, redundant_here, locking_gap)
     redundant_there = [_redundant_rows(calls, state, pivot_levels) for state in states]
     always_redundant, nearby = (
@@ -152,13 +157,15 @@ def geometric_loop_calls(engine: LoopedEngine, q: Array) -> LoopCalls:
     Bodies that were merged for simplification are separate in it, with their welds.
     """
     packed = without_merging(engine.packed)
-    mobility = LoopCalls(LoopedEngine(packed_system(geometric(packed.system), packed)), q).mobility
+    mobility = LoopCalls(
+        LoopedEngine(packed_system(with_unit_masses(packed.system), packed)), q
+    ).mobility
     slides = {
         packed.hinge_position[hinge.name]: hinge.facts.slides
         for hinge in packed.described.hinge if hinge.facts is not None
     }  # fmt: skip
     return LoopCalls(
-        LoopedEngine(packed_system(by_hinges(packed.system, slides), packed)), q, mobility
+        LoopedEngine(packed_system(with_hinge_inertia(packed.system, slides), packed)), q, mobility
     )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from ...packing.loops.system_variants import undriven
+from ...packing.loops.system_variants import without_drives
 from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .constraint_rank import geometric_loop_calls
@@ -44,7 +44,7 @@ class IndependentSpeeds:
         self, engine: LoopedEngine, free: Sequence[int], sizes: Array, closed: LoopStart
     ) -> None:
         packed, self._start = engine.packed, closed.start[0]
-        undriven_engine = LoopedEngine(packed_system(undriven(packed.system), packed))
+        undriven_engine = LoopedEngine(packed_system(without_drives(packed.system), packed))
         self._calls = geometric_loop_calls(undriven_engine, self._start)
         self._free, self.sizes = np.array(free, dtype=np.int64), sizes
         self._loops = closed.loops

@@ -13,7 +13,13 @@ from mstmm.array_validation import Array
 from mstmm.errors import LoopClosureError, MstmmError, NumericalFailure, SceneError
 
 from ...packing.initial_state import start_values
-from ...packing.loops.system_variants import LOCKED, choosing, keeping, length_of, without
+from ...packing.loops.system_variants import (
+    LOCKED,
+    characteristic_length,
+    with_coupling_values,
+    with_row_choice,
+    without_rows,
+)
 from ...packing.records.loops import LoopRecords
 from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
@@ -154,7 +160,7 @@ class LoopStart:
         q, u = start_values(packed.scene, packed.layout, packed.flexible)
         calls = LoopCalls(engine, q)
         q, u = calls.driven(q, u)
-        length = length_of(packed.system)
+        length = characteristic_length(packed.system)
         try:
             near_q = self._assembly(q, held_hinges).positions(q, _MAX_MISFIT * length)
         except LoopClosureError as error:
@@ -180,7 +186,7 @@ class LoopStart:
         `calls` are those of all rows.  Raises OpenLoop if independent rows do not close, SceneError
         if the mechanism cannot move.
         """
-        locking_gap = LOCKED * length_of(self.engine.packed.system)
+        locking_gap = LOCKED * characteristic_length(self.engine.packed.system)
         self._keep(near)
         self._whole = self.engine
         self.loops, redundant_names = self._judged(near, free_speeds)
@@ -274,7 +280,7 @@ class LoopStart:
         if any(coupling.kept is None for coupling in packed.system.couplings):
             values = LoopCalls(self.engine, q).values()
             self.engine = LoopedEngine(
-                packed_system(keeping(packed.system, values.tolist()), packed)
+                packed_system(with_coupling_values(packed.system, values.tolist()), packed)
             )
 
     def _judged(
@@ -311,7 +317,9 @@ class LoopStart:
             for direction, row in record.rows.items() if row in rank.going
         }  # fmt: skip
         chosen_counts = _independent_counts(records, rank)
-        remaining_system = choosing(without(packed.system, removed_rows, couplings), chosen_counts)
+        remaining_system = with_row_choice(
+            without_rows(packed.system, removed_rows, couplings), chosen_counts
+        )
         mobility = free_speeds - self._shared() - independent_count
         modal_speed_count = sum(slots.nu for slots in packed.layout.modal.values())
         if packed.releases:

@@ -18,7 +18,7 @@ from mstmm.scene import Hinge, split_reference
 from mstmm.scene.checks.topology import build_topology
 from mstmm.scene.tables.scene_tables import SceneTables
 
-from ...packing.loops.system_variants import length_of
+from ...packing.loops.system_variants import characteristic_length
 from ...packing.packed_scene import PackedScene
 
 #: Largest angle (rad) that counts as small, and the smallest one that may make rows independent
@@ -48,7 +48,9 @@ class _Skew:
 
 def find_skewed_axis_by_gap(packed: PackedScene, gap: float) -> str:
     """Find skewed axes as `find_skewed_axis` does, with angles that may cause a gap (m, rad)."""
-    return find_skewed_axis(packed, gap / (_GAP_PER_ANGLE * max(1.0, length_of(packed.system))))
+    return find_skewed_axis(
+        packed, gap / (_GAP_PER_ANGLE * max(1.0, characteristic_length(packed.system)))
+    )
 
 
 def find_skewed_axis(packed: PackedScene, least: float) -> str:

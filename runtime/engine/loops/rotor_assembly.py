@@ -14,7 +14,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import LoopClosureError
 
-from ...packing.loops.system_variants import length_of, with_rotors
+from ...packing.loops.system_variants import characteristic_length, with_rotors
 from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .assembly import Assembly
@@ -59,7 +59,7 @@ class RotorAssembly(Assembly):
         packed = self._engine.packed
         system, loop_records = packed.system, packed.written.loops
         masses = system.rows(lambda body: body.body_p[0] if len(body.body_p) else 0.0)
-        inertia = (float(masses.sum()) or 1.0) * length_of(system) ** 2
+        inertia = (float(masses.sum()) or 1.0) * characteristic_length(system) ** 2
         packed_with_rotors = packed_system(
             with_rotors(system, np.full(self._engine.nu, inertia).tolist()), packed
         )

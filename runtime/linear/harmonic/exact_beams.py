@@ -162,11 +162,11 @@ def _refuse(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
 def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> LinearEquations:
     """The same model, the shapes of these beams the displacements of their far ends."""
     model = linear.model
-    data = data_of(model.scene)
+    data = scene_data(model.scene)
     for beam in data["beam"]:
         if beam["name"] in names:
             _reshape(beam, model.flexible[beam["name"]].modes)
-    made = type(model)(made_of(data, model.scene), model.known)
+    made = type(model)(scene_from_data(data, model.scene), model.known)
     q = np.zeros(made.nq)
     hinges = min((slots.q for slots in model.layout.modal.values()), default=model.nq)
     q[:hinges] = linear.state.q[:hinges]

@@ -21,7 +21,7 @@ import numpy as np
 from mstmm.array_validation import Array, one_row
 from mstmm.errors import SceneError
 
-from ...packing.coordinate_layout import refuse_dense
+from ...packing.coordinate_layout import check_dense_size
 from ..mode_solvers import modes
 from ..modes import Complex
 
@@ -68,7 +68,7 @@ def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
             "number for all, or fewer"
         )
     if alone:
-        refuse_dense(len(linear), "the matrix of all motions")
+        check_dense_size(len(linear), "the matrix of all motions")
     found = modes(linear, None if alone else len(zeta), False)
     if not found.undamped or found.growing.any():
         raise SceneError(

@@ -17,7 +17,7 @@ from mstmm.array_validation import Array, Integers
 from mstmm.errors import NumericalFailure
 
 from ...engine.eigenvalues import eigenvalues
-from ...packing.qr_sweep import refuse_steps
+from ...packing.qr_sweep import reject_qr_steps
 from ...run.spectral_radius import fastest_at_start
 
 if TYPE_CHECKING:

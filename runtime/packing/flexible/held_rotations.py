@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from mstmm.scene import Hinge
 
 
-def held_turns(hinge: Hinge, rotation: Array, unknown: Array) -> Array:
+def constrained_rotations(hinge: Hinge, rotation: Array, unknown: Array) -> Array:
     """(3, 3) projection of rotations on those that a hinge holds; `rotation` are the axes of its
     outboard end in those of the body, `unknown` stands for hinges with axes that turn.
 

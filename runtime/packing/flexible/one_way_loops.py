@@ -22,13 +22,13 @@ from mstmm.scene.tables.closures import ROLLING
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort
-from .held_rotations import held_turns
+from .held_rotations import constrained_rotations
 
 #: What a section moves by in parts of the size of the shape that is rounding.
 _ROUNDING = 1e-6
 
 
-def in_loops(scene: Scene, plan: ClosurePlan) -> tuple[Hinge | Constraint, ...]:
+def loop_elements(scene: Scene, plan: ClosurePlan) -> tuple[Hinge | Constraint, ...]:
     """The hinges around all loops, cut or not, and the constraints."""
     mechanism, paths = plan.mechanism, Paths(plan.mechanism, plan.tree)
     first = len(plan.cut_of)
@@ -41,12 +41,12 @@ def in_loops(scene: Scene, plan: ClosurePlan) -> tuple[Hinge | Constraint, ...]:
     return (*(hinges[number] for number in sorted(passed.union(plan.cut_of))), *scene.constraint)
 
 
-def refuse_moving_ends(
+def check_loop_ends(
     bodies: Mapping[str, ModalBody], elements: tuple[Hinge | Constraint, ...]
 ) -> None:
     """SceneError for a shape of one of the bodies that moves a section which a loop passes."""
     for name, body in bodies.items():
-        for element, end, inboard in ends_of(name, elements):
+        for element, end, inboard in ends_on_body(name, elements):
             port = body.ports[end]
             shift, turn = _moved(body, port, _held(element, port, inboard))
             moving = shift + turn > _ROUNDING
@@ -63,7 +63,7 @@ def refuse_moving_ends(
             )
 
 
-def ends_of(
+def ends_on_body(
     name: str, elements: tuple[Hinge | Constraint, ...]
 ) -> Iterator[tuple[Hinge | Constraint, str, bool]]:
     """(element, end of the body on it, whether it is the inboard one)."""
@@ -83,7 +83,7 @@ def _held(element: Hinge | Constraint, port: ModalPort, inboard: bool) -> Array:
     if isinstance(element, Constraint):
         return np.eye(3) * (element.type == ROLLING)
     axes = port.rotation @ np.array(element.rotation) if inboard else port.rotation
-    return held_turns(element, axes, unknown=np.eye(3))
+    return constrained_rotations(element, axes, unknown=np.eye(3))
 
 
 def _moved(body: ModalBody, port: ModalPort, held: Array) -> tuple[Array, Array]:

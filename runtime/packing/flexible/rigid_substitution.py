@@ -26,8 +26,8 @@ from mstmm.scene.tables.rigid_equivalent import rigid_body_of_beam
 
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort
-from ..loops.loop_detection import may_close
-from .one_way_loops import ends_of, in_loops, refuse_moving_ends
+from ..loops.loop_detection import may_have_loops
+from .one_way_loops import check_loop_ends, ends_on_body, loop_elements
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
@@ -109,7 +109,7 @@ class _Rigidifying:
         responds = any(body.model == "one-way" for body in stiff)
         self.held = inboard_hinges_by_body(scene) if responds else {}
         self.cut = None
-        if responds and may_close(scene):
+        if responds and may_have_loops(scene):
             held = {hinge.name for hinge in self.held.values()}
             self.cut = frozenset(hinge.name for hinge in scene.hinge) - held
         self.bodies: dict[str, Body] = {}
@@ -172,9 +172,9 @@ class _Rigidifying:
         plan = None if self.cut is None else build_topology(self.scene.skeleton).plan
         if plan is None:
             return
-        elements, bodies = in_loops(self.scene, plan), self.made.one_way
-        refuse_moving_ends(bodies, elements)
-        self.made.passed = frozenset(name for name in bodies if any(ends_of(name, elements)))
+        elements, bodies = loop_elements(self.scene, plan), self.made.one_way
+        check_loop_ends(bodies, elements)
+        self.made.passed = frozenset(name for name in bodies if any(ends_on_body(name, elements)))
         self.made.looped = frozenset(
             one.name for one in elements if not isinstance(one, Constraint)
         )
@@ -275,7 +275,7 @@ def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
     return _rigid_body(body.name, float(j[0, 0]), first, j[3:, 3:], ports)
 
 
-def matrix_of(array: Array) -> Matrix:
+def _to_matrix(array: Array) -> Matrix:
     """A rotation matrix as the scene's tables hold it."""
     (a, b, c), (d, e, f), (g, h, i) = array.tolist()
     return ((a, b, c), (d, e, f), (g, h, i))
@@ -295,7 +295,7 @@ def _rigid_body(
     ends = {
         end: End(
             position=tuple(map(float, port.position)),
-            orientation=to_quaternion(matrix_of(port.rotation)),
+            orientation=to_quaternion(_to_matrix(port.rotation)),
         )
         for end, port in ports.items()
     }

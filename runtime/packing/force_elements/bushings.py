@@ -9,7 +9,7 @@ from ..scene_frames import Frames
 from ..system import ForceNumbers, Numbers
 
 
-def bushing_of(frames: Frames, bushing: Bushing) -> ForceNumbers:
+def bushing_numbers(frames: Frames, bushing: Bushing) -> ForceNumbers:
     """The force element between the place of rest, which `from` carries, and the end `to`."""
     body, axes, place = _end(frames, bushing, bushing.from_)
     turned = product(axes, bushing.rotation)

@@ -7,11 +7,11 @@ from mstmm.scene import Scene
 from ..expression_tapes import Moving
 from ..scene_frames import Frames
 from ..system import ForceNumbers
-from .bushings import bushing_of
-from .springs import spring_of
+from .bushings import bushing_numbers
+from .springs import spring_numbers
 
 
-def forces_of(frames: Frames, nodes: Scene, moving: Moving) -> tuple[ForceNumbers, ...]:
+def force_element_numbers(frames: Frames, nodes: Scene, moving: Moving) -> tuple[ForceNumbers, ...]:
     """Springs, then bushings, of the scene of nodes."""
-    springs = (spring_of(frames, spring, moving) for spring in nodes.spring)
-    return (*springs, *(bushing_of(frames, bushing) for bushing in nodes.bushing))
+    springs = (spring_numbers(frames, spring, moving) for spring in nodes.spring)
+    return (*springs, *(bushing_numbers(frames, bushing) for bushing in nodes.bushing))

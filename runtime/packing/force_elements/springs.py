@@ -10,7 +10,7 @@ from ..scene_frames import Frames
 from ..system import ForceNumbers, Numbers
 
 
-def spring_of(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbers:
+def spring_numbers(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbers:
     """The force element between the ends of a spring, and its given effort."""
     element = frames.elements.get("force", spring.type, spring.name)
     one, other = (

@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..system import BodyNumbers, BodyRun, ClosureNumbers
-from .constraint_numbers import constraint_demand
+from .constraint_numbers import constraint_closure
 
 if TYPE_CHECKING:
     from ..scene_frames import Frames
     from .cut_tree import Cut
 
 
-def closures_of(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[ClosureNumbers]:
+def closure_numbers(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[ClosureNumbers]:
     """Those of cut hinges, then those of constraints."""
     if not frames.expanded.cuts:
         return
@@ -23,7 +23,7 @@ def closures_of(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[ClosureNumb
         if cut.constraint is None:
             yield _hinge(frames, cut, place, alone[place])
         else:
-            yield constraint_demand(cut.constraint, frames, place)
+            yield constraint_closure(cut.constraint, frames, place)
 
 
 def _hinge(frames: Frames, cut: Cut, place: int, frame: BodyNumbers) -> ClosureNumbers:

@@ -9,10 +9,10 @@ from mstmm.scene.tables.hinge_frames import axes_about
 from mstmm.scene.validators.scalars_and_vectors import GROUND, split_reference
 
 from ..coordinate_layout import OF_CONSTRAINT
-from .curve_constraints import along
+from .curve_constraints import curve_hinge
 
 
-def holding(constraint: Constraint) -> Hinge:
+def frame_hinge(constraint: Constraint) -> Hinge:
     """The hinge that holds the frame of a constraint where it begins: a weld, with z along the
     normal where there is one, or a way along the curve.  Their names are those of no scene."""
     name, normal = f"{constraint.name}{OF_CONSTRAINT}", constraint.unit_normal
@@ -24,4 +24,4 @@ def holding(constraint: Constraint) -> Hinge:
         "name": name, "inboard": constraint.from_, "outboard": f"{name}/frame",
         "position": constraint.position if on_ground else (0.0, 0.0, 0.0),
     })  # fmt: skip
-    return along(constraint, held) if constraint.type == CURVE else held
+    return curve_hinge(constraint, held) if constraint.type == CURVE else held

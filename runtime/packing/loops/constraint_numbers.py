@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _SELF = (*IDENTITY[0], *IDENTITY[1], *IDENTITY[2])
 
 
-def constraint_demand(constraint: Constraint, frames: Frames, place: int) -> ClosureNumbers:
+def constraint_closure(constraint: Constraint, frames: Frames, place: int) -> ClosureNumbers:
     """What a constraint asks of its frame at a place of the tree and the point at its other end."""
     body, axes, end = frames.end(constraint.to)
     if body < 0:

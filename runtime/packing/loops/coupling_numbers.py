@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..scene_frames import Frames
 
 
-def couplings_of(
+def coupling_numbers(
     frames: Frames, runs: Sequence[BodyRun]
 ) -> tuple[tuple[CouplingNumbers, ...], KernelIR | None]:
     """Couplings, and the kernel t, q, u -> the numbers of all: of each drift, value, rate, rate at

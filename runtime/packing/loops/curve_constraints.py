@@ -32,7 +32,7 @@ _OUTPUTS = (Port("R", (3, 3)), Port("d", (3,)), Port("H", (6,)), Port("v", (3,))
             Port("c", (6,)), Port("qdot", (1,)))  # fmt: skip
 
 
-def along(constraint: Constraint, held: Hinge) -> Hinge:
+def curve_hinge(constraint: Constraint, held: Hinge) -> Hinge:
     """The hinge `held` with the curve in place of its weld."""
     name = _type(constraint)
     moving = held.model_copy(update={
@@ -45,7 +45,7 @@ def along(constraint: Constraint, held: Hinge) -> Hinge:
     return moving
 
 
-def elements_of(constraints: Iterable[Constraint]) -> dict[Key, Element]:
+def curve_elements(constraints: Iterable[Constraint]) -> dict[Key, Element]:
     """The hinges along curves, run by the interpreter."""
     curves = [one for one in constraints if one.curve is not None]
     return {("hinge", _type(curve)): _element(curve) for curve in curves}

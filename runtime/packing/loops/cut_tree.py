@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from mstmm.scene import Body, Constraint, End, Scene, split_reference
 from mstmm.scene.checks.topology import build_topology
 
-from .constraint_frames import holding
-from .loop_detection import may_close
+from .constraint_frames import frame_hinge
+from .loop_detection import may_have_loops
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Cut:
 
 def cut_loops(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
     """The tree, and what closes its loops: cut hinges, then constraints; a tree is its own."""
-    if not may_close(scene):
+    if not may_have_loops(scene):
         return scene, ()
     plan = build_topology(scene.skeleton).plan
     if plan is None or not (plan.cut or scene.constraint):
@@ -53,7 +53,7 @@ def cut_loops(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
         bodies.append(_frame(cut.frame, ends))
         cuts.append(cut)
     for constraint in scene.constraint:
-        hinge = holding(constraint)
+        hinge = frame_hinge(constraint)
         tables.append(hinge)
         bodies.append(_frame(hinge.outboard, {}))
         cuts.append(Cut(hinge.name, hinge.outboard, split_reference(constraint.to)[0], constraint))

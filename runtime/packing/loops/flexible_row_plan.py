@@ -15,7 +15,7 @@ from ..system import System
 from .row_plan import plan_rows
 
 
-class BentPlan:
+class FlexibleRowPlan:
     """A plan of rows by bodies: `rows`, `of`, `pairs` and `pending` as of `RowPlan`; `bent` are the
     rows that pass the modes of a flexible body, ascending."""
 

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 _NAMED = 8
 
 
-def may_close(scene: Scene) -> bool:
+def may_have_loops(scene: Scene) -> bool:
     """Whether anything but a tree can be meant: more hinges than bodies, or rows between bodies."""
     skeleton = scene.skeleton
     more = len(skeleton.hinge) != len(skeleton.body)
     return more or bool(scene.constraint or scene.coupling)
 
 
-def named_loop(scene: SceneTables, plan: ClosurePlan) -> str:
+def loop_label(scene: SceneTables, plan: ClosurePlan) -> str:
     """The first loop by its hinges, or by what closes one without hinges."""
     if not plan.cut:
         for constraint in scene.constraint[:1]:

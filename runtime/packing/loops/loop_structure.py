@@ -16,18 +16,18 @@ from mstmm.ir.scene_structure import (
 )
 
 from ..system import ClosureNumbers, CouplingNumbers, System
-from .flexible_row_plan import BentPlan
+from .flexible_row_plan import FlexibleRowPlan
 from .row_plan import row_groups
 
 
-class Sort(Protocol):
+class EntrySorter(Protocol):
     """Sorts numbers into structural constants and places in p."""
 
     def __call__(self, values: Iterable[float], axes: bool = False) -> Entries: ...
 
 
 def with_loops(
-    bodies: Sequence[BodyStructure], system: System, sort: Sort, floors: Sequence[float]
+    bodies: Sequence[BodyStructure], system: System, sort: EntrySorter, floors: Sequence[float]
 ) -> tuple[
     tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...],
     tuple[CouplingStructure, ...],
@@ -35,7 +35,7 @@ def with_loops(
     """The bodies with the rows that are open across their hinges, closures in the order of their
     frames, rows, and couplings.  `floors` go by row; without them a pivot counts that is more than
     zero."""
-    plan = BentPlan(system, row_groups([body.parent for body in bodies], system))
+    plan = FlexibleRowPlan(system, row_groups([body.parent for body in bodies], system))
     soft: dict[int, Entries] = {}
     closures = [
         _closure(one, plan.of[group], bodies[one.frame], sort, soft)
@@ -69,7 +69,7 @@ def with_loops(
 
 
 def _coupling(
-    one: CouplingNumbers, row: int, bodies: Sequence[BodyStructure], sort: Sort
+    one: CouplingNumbers, row: int, bodies: Sequence[BodyStructure], sort: EntrySorter
 ) -> CouplingStructure:
     columns, at = list[tuple[int, int]](), one.first + len(COUPLING_NUMBERS)
     for hinge in one.hinges:
@@ -80,7 +80,7 @@ def _coupling(
     return CouplingStructure(row, one.first, unasked, kept, tuple(columns))
 
 
-def _pending(bodies: Sequence[BodyStructure], plan: BentPlan) -> tuple[BodyStructure, ...]:
+def _pending(bodies: Sequence[BodyStructure], plan: FlexibleRowPlan) -> tuple[BodyStructure, ...]:
     def passing(place: int, body: BodyStructure) -> BodyStructure:
         pending, bent = plan.pending.get(place, ()), plan.bent.get(place, ())
         return replace(body, pending=tuple(pending), bent=tuple(bent)) if pending or bent else body
@@ -89,7 +89,11 @@ def _pending(bodies: Sequence[BodyStructure], plan: BentPlan) -> tuple[BodyStruc
 
 
 def _closure(
-    one: ClosureNumbers, own: range, frame: BodyStructure, sort: Sort, soft: dict[int, Entries]
+    one: ClosureNumbers,
+    own: range,
+    frame: BodyStructure,
+    sort: EntrySorter,
+    soft: dict[int, Entries],
 ) -> ClosureStructure:
     """A closure; rows of rotors get their inertia in `soft`."""
     rows = [-1 if direction < one.asked else -2 for direction in range(6)]

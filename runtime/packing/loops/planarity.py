@@ -17,7 +17,7 @@ _ROUNDING = 1e-14
 _ALIKE = {("force", "spring"), ("force", "bushing6"), ("force", "bearing6"), ("force", "bearing3")}
 
 
-def plane_of(system: System, elements: Elements) -> Array | None:
+def motion_plane(system: System, elements: Elements) -> Array | None:
     """Axes (3, 3) of the plane in inertial ones, z across it, if hinges alone close the loops, all
     are free and turn about one axis, and all bodies are rigid; else None.
 

@@ -50,7 +50,7 @@ def _counting(one: ClosureNumbers, more: int) -> tuple[int, int] | None:
     return None if one.choice is None else (one.choice[0], one.choice[1] + more)
 
 
-def keeping(system: System, values: Sequence[float]) -> System:
+def with_coupling_values(system: System, values: Sequence[float]) -> System:
     """With couplings whose values were not known keeping these, of all couplings in their order."""
     couplings = tuple(
         replace(one, kept=float(value)) if one.kept is None else one
@@ -59,7 +59,7 @@ def keeping(system: System, values: Sequence[float]) -> System:
     return replace(system, couplings=couplings)
 
 
-def choosing(system: System, counts: Mapping[int, int]) -> System:
+def with_row_choice(system: System, counts: Mapping[int, int]) -> System:
     """With rows that are chosen anew along the way, so many as `counts` says of the closures whose
     frames are at some places; whether each is at rest stands in memory before what inputs hold."""
     closures, first = list[ClosureNumbers](), system.held.first
@@ -74,7 +74,7 @@ def choosing(system: System, counts: Mapping[int, int]) -> System:
     return replace(system, closures=tuple(closures), held=held, n_memory=system.n_memory + more)
 
 
-def without(
+def without_rows(
     system: System, rows: Collection[tuple[int, int]], couplings: Collection[str] = ()
 ) -> System:
     """Without some rows, each given by the place of its closure's frame and its direction, and
@@ -89,7 +89,7 @@ def without(
     return replace(system, closures=closures, couplings=left)
 
 
-def undriven(system: System) -> System:
+def without_drives(system: System) -> System:
     """With the same speeds imposed, but by nobody: they are what a state says."""
     return replace(system, drives=None, driven=())
 
@@ -99,7 +99,7 @@ def with_drives_released(system: System) -> System:
     driven = set(system.driven)
     runs = tuple(_run_freed(run, driven) for run in system.bodies)
     closures = tuple(_closure_freed(one, system, driven) for one in system.closures)
-    return replace(undriven(system), bodies=runs, closures=closures)
+    return replace(without_drives(system), bodies=runs, closures=closures)
 
 
 def _run_freed(run: BodyRun, driven: Collection[tuple[int, int]]) -> BodyRun:
@@ -124,7 +124,7 @@ def with_loops_open(system: System) -> System:
     return replace(system, closures=(), couplings=(), coupled=None)
 
 
-def stiff(system: System) -> System:
+def with_stiff_modes(system: System) -> System:
     """With modal masses that stand for the stiffness of flexible bodies: they bend where nothing
     else closes a loop."""
 
@@ -144,7 +144,7 @@ def stiff(system: System) -> System:
     return replace(system, bodies=runs)
 
 
-def length_of(system: System) -> float:
+def characteristic_length(system: System) -> float:
     """Root mean square distance between hinges, m; 1 where all of them meet in one point."""
     squares = [sum(x * x for x in body.connection[9:12]) for body in system.distinct]
     squares += [sum(x * x for x in one.end) for one in system.closures]
@@ -152,7 +152,7 @@ def length_of(system: System) -> float:
     return float(np.sqrt(np.mean(found))) if found else 1.0
 
 
-def geometric(system: System) -> System:
+def with_unit_masses(system: System) -> System:
     """With mass 1 at the input end of every rigid body, and one radius of gyration for all: what
     moves is not hidden behind what is heavy."""
     moment = _moment(system)
@@ -160,7 +160,7 @@ def geometric(system: System) -> System:
     return _with_bodies(system, lambda _, body: replace(body, body_p=numbers))
 
 
-def by_hinges(system: System, slides: Mapping[int, Collection[int]]) -> System:
+def with_hinge_inertia(system: System, slides: Mapping[int, Collection[int]]) -> System:
     """As `geometric`, with the inertia in the hinges and none in the bodies: what a row asks of the
     hinges of its loop is not hidden behind all that hangs on them.  `slides` are the speeds that
     move points, by the place of the hinge."""
@@ -192,7 +192,7 @@ def with_rotors(system: System, inertia: Sequence[float]) -> System:
 
 
 def _moment(system: System) -> float:
-    return (_GYRATION * length_of(system)) ** 2
+    return (_GYRATION * characteristic_length(system)) ** 2
 
 
 def _with_bodies(system: System, changed: Callable[[int, BodyNumbers], BodyNumbers]) -> System:

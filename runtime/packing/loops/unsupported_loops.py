@@ -9,13 +9,13 @@ from mstmm.scene.checks.topology import build_topology
 from mstmm.scene.tables.closures import ROLLING
 
 from ...integrate.steppers import INDEX3_SUFFIX
-from .loop_detection import named_loop
+from .loop_detection import loop_label
 
 if TYPE_CHECKING:
     from ..packed_scene import PackedScene
 
 
-def refuse(packed: PackedScene, what: str, instead: str) -> None:
+def reject_loops(packed: PackedScene, what: str, instead: str) -> None:
     """SceneError where loops are closed, which `what` cannot follow; `instead` does."""
     if not packed.system.closes:
         return
@@ -23,11 +23,11 @@ def refuse(packed: PackedScene, what: str, instead: str) -> None:
     plan = build_topology(scene).plan
     assert plan is not None
     raise SceneError(
-        f"scene: {named_loop(scene, plan)} is closed, and {what} cannot follow that yet; {instead}"
+        f"scene: {loop_label(scene, plan)} is closed, and {what} cannot follow that yet; {instead}"
     )
 
 
-def refuse_of_speeds(packed: PackedScene, method: str) -> None:
+def reject_speed_constraints(packed: PackedScene, method: str) -> None:
     """SceneError for rows of speeds, which a method on positions does not meet."""
     scene = packed.described
     names = [f'coupling "{one.name}"' for one in scene.coupling if one.speeds is not None]
@@ -39,7 +39,7 @@ def refuse_of_speeds(packed: PackedScene, method: str) -> None:
         )
 
 
-def refuse_beyond_hinges(packed: PackedScene, what: str, instead: str) -> None:
+def reject_constraints(packed: PackedScene, what: str, instead: str) -> None:
     """SceneError where more than hinges closes loops, which `what` cannot follow yet; `instead`
     does."""
     scene = packed.described
@@ -56,10 +56,10 @@ def refuse_beyond_hinges(packed: PackedScene, what: str, instead: str) -> None:
 _ALIEN = ("dttmm", "exprb32")
 
 
-def refuse_method(packed: PackedScene, method: str, tangent: str) -> None:
+def reject_loop_method(packed: PackedScene, method: str, tangent: str) -> None:
     """SceneError where loops are closed, for an implicit method that cannot follow them, and for
     the tangent of laws alone."""
     if method in _ALIEN:
-        refuse(packed, f'method "{method}"', "genalpha and rodas4p2 do")
+        reject_loops(packed, f'method "{method}"', "genalpha and rodas4p2 do")
     if tangent == "laws":
-        refuse(packed, 'tangent = "laws"', 'take tangent = "exact"')
+        reject_loops(packed, 'tangent = "laws"', 'take tangent = "exact"')

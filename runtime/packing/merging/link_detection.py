@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..records.body_records import link_of
+from ..records.body_records import link_kernel
 from ..system import BodyRun
 from .simplification import LINKS, Simplification
 
@@ -17,7 +17,7 @@ def link_simplifications(runs: Iterable[BodyRun], names: Iterable[str]) -> list[
     its first member)."""
     found: dict[str, list[tuple[str, int]]] = {}
     for run, name in zip(runs, names, strict=True):
-        if link := link_of(run.alike[0]):
+        if link := link_kernel(run.alike[0]):
             found.setdefault(link, []).append((name, run.count))
     return [_of_kind(link, hinges) for link, hinges in found.items()]
 

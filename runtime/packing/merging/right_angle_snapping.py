@@ -16,7 +16,7 @@ from .simplification import TURNS, Simplification
 _ROUNDING = 1e-15
 
 
-def with_exact_turns(scene: Scene, tolerance: float) -> tuple[Scene, list[Simplification]]:
+def with_right_angles(scene: Scene, tolerance: float) -> tuple[Scene, list[Simplification]]:
     """The scene in which orientations of hinges and of ends of bodies that differ from quarter
     turns by up to `tolerance` (rad) are these, and a record for each; chains stay as they are."""
     told = list[Simplification]()
@@ -29,7 +29,7 @@ def with_exact_turns(scene: Scene, tolerance: float) -> tuple[Scene, list[Simpli
 
 
 def _hinge(hinge: Hinge, tolerance: float, told: list[Simplification]) -> Hinge:
-    found = quarter_turns(hinge.rotation, tolerance)
+    found = nearest_right_angles(hinge.rotation, tolerance)
     if found is None:
         return hinge
     told.append(_record((hinge.name,), f'hinge "{hinge.name}"', found[1]))
@@ -39,7 +39,7 @@ def _hinge(hinge: Hinge, tolerance: float, told: list[Simplification]) -> Hinge:
 def _body(body: Body, tolerance: float, told: list[Simplification]) -> Body:
     ends = dict(body.ends)
     for name, end in body.ends.items():
-        found = quarter_turns(end.rotation, tolerance)
+        found = nearest_right_angles(end.rotation, tolerance)
         if found is not None:
             ends[name] = end.model_copy(update={"orientation": found[0]})
             told.append(_record((body.name, name), f'end "{body.name}.{name}"', found[1]))
@@ -51,7 +51,7 @@ def _record(elements: tuple[str, ...], what: str, off: float) -> Simplification:
     return Simplification(TURNS, elements, text)
 
 
-def quarter_turns(rotation: Matrix, tolerance: float) -> tuple[Vector, float] | None:
+def nearest_right_angles(rotation: Matrix, tolerance: float) -> tuple[Vector, float] | None:
     """Roll, pitch and yaw of the quarter turns from which a rotation differs by more than rounding
     and up to `tolerance`, and by how much (rad); None where there are none."""
     nearest = tuple(tuple(float(round(x)) for x in row) for row in rotation)

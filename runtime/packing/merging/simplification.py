@@ -51,7 +51,7 @@ class Simplification:
         return self.text
 
 
-def asked_for(simplify: bool | Collection[str] | Words) -> Words:
+def parse_simplify(simplify: bool | Collection[str] | Words) -> Words:
     """The words that an option means, others as usual where it is a table; SceneError for words
     that are not known."""
     if isinstance(simplify, bool):

@@ -9,28 +9,28 @@ from mstmm.scene.robots.merged_inertia import merge_inertia
 from mstmm.scene.robots.robot_model import Link
 
 
-def orientation_of(pose: Pose) -> Quaternion | Vector:
+def to_orientation(pose: Pose) -> Quaternion | Vector:
     """The axes of a frame as a scene's tables hold them."""
     return ZERO if pose.rotation == IDENTITY else to_quaternion(pose.rotation)
 
 
-def end_at(pose: Pose) -> End:
+def to_end(pose: Pose) -> End:
     """An end that lies so."""
-    return End(position=pose.position, orientation=orientation_of(pose))
+    return End(position=pose.position, orientation=to_orientation(pose))
 
 
-def end_of(body: Body, at: str) -> Pose:
+def end_pose(body: Body, at: str) -> Pose:
     """An end of a body in its axes; "" is its origin."""
     return Pose(body.end_position(at), body.end_rotation(at))
 
 
 def weld_pose(weld: Hinge, inboard: Body | None, outboard: Body) -> Pose:
     """The outboard body in the axes of the inboard one; None: of the ground."""
-    held = Pose(weld.position) if inboard is None else end_of(inboard, weld.inboard_end)
-    return held.then(Pose(ZERO, weld.rotation)).then(end_of(outboard, weld.outboard_end).inverse)
+    held = Pose(weld.position) if inboard is None else end_pose(inboard, weld.inboard_end)
+    return held.then(Pose(ZERO, weld.rotation)).then(end_pose(outboard, weld.outboard_end).inverse)
 
 
-def together(whole: Body, part: Body, pose: Pose) -> Body:
+def merged_body(whole: Body, part: Body, pose: Pose) -> Body:
     """The first body with the second one's mass and inertia, in the axes of the first; `pose` is
     that of the second in them."""
     mass, center, inertia = merge_inertia([(_alone(whole), IDENTITY_POSE), (_alone(part), pose)])

@@ -60,7 +60,7 @@ class WeldedBodies:
             )  # fmt: skip
 
 
-def carried_in(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
+def find_welded_bodies(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
     """Every rigid body that a fixed hinge of the user's welds to another rigid one.
 
     Not those whose hinge may let go or whose load a run looks at, and sections of flexible bodies;

@@ -87,9 +87,14 @@ class BodyRecords:
     def _numbers(self, record: Any, body: BodyNumbers) -> None:
         """Arrays side by side in memory."""
         link: Numbers = ()
-        if link_of(body):
+        if link_kernel(body):
             # every link has room for a number of its hinge
-            link = (*body.body_p, body.rotor[0], *(body.hinge_p or (0.0,)), *connection_of(body))
+            link = (
+                *body.body_p,
+                body.rotor[0],
+                *(body.hinge_p or (0.0,)),
+                *connection_numbers(body),
+            )
         own = (*body.body_p, *body.body_frame)
         start = self.memory.reals(
             (*body.connection, 0.0, 0.0, -body.height, *body.rotor, *body.hinge_p, *own, *link)
@@ -102,11 +107,14 @@ class BodyRecords:
 
     def _kernels(self, body: BodyNumbers, posed: bool) -> Any:
         """Functions of the hinge, the body and the link, shared by bodies of one kind."""
-        link = "" if posed else link_of(body)
+        link = "" if posed else link_kernel(body)
         kind = (body.hinge, body.body, link)
         if kind not in self._made:
             made = self._kernels_of(body.hinge, body.body, link)
-            made.link_numbers, made.link_angles = len(connection_of(body)), int(bool(body.link))
+            made.link_numbers, made.link_angles = (
+                len(connection_numbers(body)),
+                int(bool(body.link)),
+            )
             self._made[kind] = made
         return self._made[kind]
 
@@ -129,12 +137,12 @@ class BodyRecords:
         return made
 
 
-def connection_of(body: BodyNumbers) -> Numbers:
+def connection_numbers(body: BodyNumbers) -> Numbers:
     """Numbers of the way from the parent in a link: screws, or a rotation and a place."""
     return body.link or body.connection
 
 
-def link_of(body: BodyNumbers) -> str:
+def link_kernel(body: BodyNumbers) -> str:
     """The link that a body with its hinge is swept as; none where it is no link, where something
     imposes the speed, for several speeds with rotors, and for hinges of the user's."""
     if not body.linked:

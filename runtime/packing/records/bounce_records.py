@@ -34,7 +34,9 @@ class Bounce:
     places: tuple[tuple[int, int], ...]
 
 
-def bounces(scene: Scene, layout: Layout, probes: dict[tuple[str, str], int]) -> tuple[Bounce, ...]:
+def build_bounces(
+    scene: Scene, layout: Layout, probes: dict[tuple[str, str], int]
+) -> tuple[Bounce, ...]:
     """Bounces in the order of the events; `probes` are all ends whose places these read.
 
     Raises SceneError for conditions of speeds, and of coordinates whose rates are no speeds.

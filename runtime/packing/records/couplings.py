@@ -22,7 +22,7 @@ class WrittenCoupling:
     columns: dict[int, int]
 
 
-def placed(
+def place_couplings(
     model: Any, system: System, rows: Sequence[int], take: Callable[[int], int]
 ) -> tuple[WrittenCoupling, ...]:
     """Rows and places of couplings, whose numbers one tape writes; `rows` are those of the ones

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..system import System
-from .body_records import connection_of, link_of
+from .body_records import connection_numbers, link_kernel
 from .memory import Memory
 
 
@@ -15,9 +15,9 @@ def attach_runs(model: Any, system: System, memory: Memory, lib: Any, place: int
     ffi, count = memory.ffi, max(1, system.count)
     runs, numbers = ffi.new("mstmm_branch[]", count), memory.new("real *[]", count)
     size, gathered = ffi.new("int64_t *"), ffi.NULL
-    links = [bool(link_of(body)) for body in system.distinct]
+    links = [bool(link_kernel(body)) for body in system.distinct]
     if sum(links) + (not all(links)) > count // 4:
-        own = system.rows(lambda body: int(lib.MSTMM_LINK_OWN) + len(connection_of(body)))
+        own = system.rows(lambda body: int(lib.MSTMM_LINK_OWN) + len(connection_numbers(body)))
         gathered = memory.new("real[]", max(1, int(own.sum())))
     found = lib.mstmm_fill_runs(model, runs, numbers, gathered, place, size)
     shorter = memory.new("mstmm_branch[]", max(1, found))  # often one run for thousands of bodies

@@ -12,11 +12,11 @@ from mstmm.array_validation import Array
 from mstmm.graph.mechanism_graph import GROUND
 
 from ...kernels.c_records import CRecords
-from ..loops.flexible_row_plan import BentPlan
+from ..loops.flexible_row_plan import FlexibleRowPlan
 from ..loops.row_plan import row_groups
-from ..loops.system_variants import LOCKED, length_of
+from ..loops.system_variants import LOCKED, characteristic_length
 from ..system import ClosureNumbers, System
-from .couplings import WrittenCoupling, attach_couplings, placed
+from .couplings import WrittenCoupling, attach_couplings, place_couplings
 from .memory import Memory
 
 
@@ -41,7 +41,7 @@ class LoopRecords:
     def __init__(
         self,
         place: int,
-        plan: BentPlan,
+        plan: FlexibleRowPlan,
         rows: Any,
         closures: tuple[WrittenClosure, ...],
         couplings: tuple[WrittenCoupling, ...],
@@ -121,7 +121,7 @@ class _Loops:
     def __init__(self, model: Any, system: System, memory: Memory, lib: Any) -> None:
         self.model, self.system, self.memory, self.lib = model, system, memory, lib
         self.parents = [int(parent) for parent in system.parents]
-        self.plan = BentPlan(system, row_groups(self.parents, system))
+        self.plan = FlexibleRowPlan(system, row_groups(self.parents, system))
         self.row_numbers = int(lib.MSTMM_ROW)
         count = len(self.plan.rows)
         self.dump = count * self.row_numbers
@@ -158,7 +158,7 @@ class _Loops:
         memory.kept.append(records_of_bodies)
         looped = records_of_bodies.array
         behind = self.plan.of[len(self.system.closures) :]
-        couplings = placed(model, self.system, [rows[0] for rows in behind], self._take)
+        couplings = place_couplings(model, self.system, [rows[0] for rows in behind], self._take)
         self.coupled = {
             (hinge, one.row): at
             for one in couplings if one.row >= 0
@@ -196,7 +196,7 @@ class _Loops:
         model.n_closures = len(self.system.closures)
         model.loops, model.loops_summed = place, self.summed
         model.answer = place + self._take(self.system.nu)
-        model.loops_apart = LOCKED * length_of(self.system)
+        model.loops_apart = LOCKED * characteristic_length(self.system)
         closures = tuple(written[group] for group in sorted(written))
         coupled = tuple(one for one in couplings if one.row >= 0)
         made = LoopRecords(place, self.plan, records, closures, coupled, records_of_bodies)

@@ -10,8 +10,8 @@ from mstmm.array_validation import Integers
 from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 
 from ...kernels import prebuilt_kernels
-from ..load_coupling import Reach, reach_of
-from ..loops.planarity import plane_of
+from ..load_coupling import Reach, load_coupling
+from ..loops.planarity import motion_plane
 from ..scene_elements import Elements
 from ..system import ForceNumbers, LoadNumbers, System
 from .body_records import BodyRecords
@@ -19,7 +19,7 @@ from .laws import LawRecords
 from .links import attach_runs
 from .loops import LoopRecords, attach_loops
 from .memory import Memory
-from .planar_records import attach_flat
+from .planar_records import attach_planar_bodies
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Written:
     loops: LoopRecords | None
 
 
-def write(system: System, elements: Elements) -> Written:
+def write_model(system: System, elements: Elements) -> Written:
     """The records of a system."""
     ffi, lib = prebuilt_kernels.module()
     memory = Memory(ffi)
@@ -61,7 +61,7 @@ def write(system: System, elements: Elements) -> Written:
     model.drive_tape = memory.expression(system.drives)
     laws = LawRecords(system, memory)
     model.laws, model.n_laws = laws.records.array, laws.records.count
-    reach = reach_of(system)
+    reach = load_coupling(system)
     for place in reach.placed:
         bodies.records.array[place].placed = 1
     loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
@@ -79,9 +79,11 @@ def write(system: System, elements: Elements) -> Written:
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
     behind, loops = attach_loops(model, system, memory, lib, bodies.end)
-    axes = plane_of(system, elements)
+    axes = motion_plane(system, elements)
     if loops is not None and axes is not None:
-        behind = attach_flat(model, system, elements, memory, lib, loops.of_bodies, axes, behind)
+        behind = attach_planar_bodies(
+            model, system, elements, memory, lib, loops.of_bodies, axes, behind
+        )
     scratch = attach_runs(model, system, memory, lib, behind)
     modal = bodies.modal
     return Written(

@@ -20,7 +20,7 @@ from .memory import Memory
 _OF_LOOPS = ("first_row", "n_rows", "n_pending", "pending")
 
 
-def attach_flat(
+def attach_planar_bodies(
     model: Any,
     system: System,
     elements: Elements,

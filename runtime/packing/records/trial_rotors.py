@@ -10,7 +10,7 @@ from .model_record import Written
 
 
 @contextmanager
-def rotors(written: Written) -> Iterator[Callable[[int], None]]:
+def trial_rotors(written: Written) -> Iterator[Callable[[int], None]]:
     """Lets rotors of 1 kg m^2 be given to the hinges at places of the tree; all of them are taken
     away again.  Links know no rotors, so that the sweep goes body by body meanwhile."""
     ffi, _ = prebuilt_kernels.module()

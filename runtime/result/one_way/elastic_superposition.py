@@ -18,7 +18,7 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.scene import split_reference
 
-from ...packing.flexible.held_rotations import held_turns
+from ...packing.flexible.held_rotations import constrained_rotations
 from .response import Response, rigidified_bodies, split_node
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ class Superposition:
             shift = np.zeros_like(shift)
         zero = np.zeros((3, 3))
         constrained_rotation = (
-            zero if hinge is None else held_turns(hinge, port.rotation, unknown=zero)
+            zero if hinge is None else constrained_rotations(hinge, port.rotation, unknown=zero)
         )
         return self._section(
             name, replace(port, phi=shift, theta=constrained_rotation @ port.theta)

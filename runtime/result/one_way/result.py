@@ -13,7 +13,7 @@ from mstmm.risk import Risk
 
 from ...engine.compiled_scene import CompiledScene
 from ...packing.flexible.rigid_substitution import with_level
-from ...packing.hinge_release import releasable
+from ...packing.hinge_release import releasable_hinges
 from ...run.start_state import initial_state
 from ..flexible.body_motions import FlexibleBodies
 from ..flexible.modal_participation import participation_by_body
@@ -48,7 +48,7 @@ def _coupling_risk(share: tuple[str, float]) -> Risk:
 
 def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
     """Each one-way body whose hinge releases it."""
-    releasing_hinges, rigid = set(releasable(model.scene)), rigidified_bodies(model)
+    releasing_hinges, rigid = set(releasable_hinges(model.scene)), rigidified_bodies(model)
     holders = {body: h.name for body, h in rigid.holders.items() if h.name in releasing_hinges}
     return tuple(
         Risk(
