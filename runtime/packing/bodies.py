@@ -1,4 +1,4 @@
-"""Bodies of a scene -> their numbers in internal frames, those of chains once for all alike."""
+"""Body numbers in internal frames; equal members of a chain are computed once."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ RIGID = "rigid"
 
 
 class Bodies:
-    """Makes the numbers of all bodies, and keeps their internal frames.
+    """Computes the numbers of all bodies and stores their internal frames.
 
-    A body of its own is made in its place.  Of a chain the first member, one period of its pattern
-    and the last are made, whose frame suits what hangs on it.
+    Of a chain only the first member, one period of its pattern and the last member are computed:
+    the frame of the last one depends on its own child.
     """
 
     def __init__(
@@ -63,10 +63,10 @@ class Bodies:
         self._last: dict[int, Placement] = {}
 
     def placement(self, body: int) -> Placement:
-        """Internal frame of the body of this number."""
-        whole = self.carried.by.get(body)
-        if whole is not None:
-            return self.carried.placed(body, self._placements[whole][0])
+        """Internal frame of a body, given by its number."""
+        carrier = self.carried.by.get(body)
+        if carrier is not None:
+            return self.carried.placed(body, self._placements[carrier][0])
         if body < len(self.scene.body):
             return self._placements[body][0]
         chain, k = self.scene.bodies.member(body)
@@ -77,54 +77,55 @@ class Bodies:
         return period[k % len(period)]
 
     def run(self, run: BodyRow) -> BodyRun:
-        """Numbers of a run, behind those of the run it hangs on."""
+        """Numbers of a run of bodies; call it for the inboard run first."""
         period = self._period(run)
         count = min(run.count, period + 1)
-        made = [self._body(run, k) for k in range(count)]
+        members = [self._body_numbers(run, k) for k in range(count)]
         if run.count > count:
-            made.append(self._body(run, run.count - 1))
+            members.append(self._body_numbers(run, run.count - 1))
         slots = self.layout.group(run.hinge)
         placements = self._placements[run.body]
         self._last[run.body] = placements[-1]
         del placements[period:]
-        return BodyRun(run.place, run.parent, run.count, period, tuple(made), slots)
+        return BodyRun(run.place, run.parent, run.count, period, tuple(members), slots)
 
     # --- one body ---------------------------------------------------------------------------
 
-    def _body(self, run: BodyRow, k: int) -> BodyNumbers:
-        """Numbers of the run's member k."""
+    def _body_numbers(self, run: BodyRow, k: int) -> BodyNumbers:
+        """Numbers of member k of a run."""
         body, hinge = self.scene.bodies[run.body + k], self.scene.hinges[run.hinge + k]
         slots = self.layout.slots(run.hinge + k)
         inboard, outboard = hinge_frames(hinge)
-        own = frame_placement.body_placement(body, run.outboard_end, outboard)
+        hinge_placement = frame_placement.body_placement(body, run.outboard_end, outboard)
         flexible = self.expanded.is_node(body.name)
-        child = self._child(run, k) if self.align and not flexible else None
-        place = denavit_hartenberg.align_frame(own, hinge, child)
-        self._placements.setdefault(run.body, []).append(place)
-        modal, section = self._flexible(body.name, place) if flexible else (None, None)
+        child = self._first_child(run, k) if self.align and not flexible else None
+        placement = denavit_hartenberg.align_frame(hinge_placement, hinge, child)
+        self._placements.setdefault(run.body, []).append(placement)
+        modal, section = self._modal_and_section(body.name, placement) if flexible else (None, None)
         link: Numbers = ()
-        connection = _UNMOVED
+        connection = _IDENTITY_CONNECTION
         if section is None or section.inward:
             axial = self.align and not flexible and denavit_hartenberg.is_axial(hinge)
-            link, connection = self._connection(run, k, inboard, place, axial)
+            link, connection = self._link_and_connection(run, k, inboard, placement, axial)
         hinge_p = _hinge_parameters(hinge)
-        body_p, body_frame = self._body_parameters(run.body + k, place)
+        body_p, body_frame = self._body_parameters(run.body + k, placement)
         rotor, imposed = _rotor_and_imposed(hinge, slots)
         return BodyNumbers(
             ("hinge", kernel_type(hinge, self.releases)), ("body", body.type), slots.nq, slots.nu,
-            slots.straight, slots.steady, slots.turning, connection, link, place.height, hinge_p,
+            slots.straight, slots.steady, slots.turning, connection, link, placement.height,
+            hinge_p,
             body_p, body_frame, rotor, imposed, self.releases.get(hinge.name, -1), modal, section,
             body.name in self.expanded.idle, self.linked,
         )  # fmt: skip
 
-    def _flexible(
-        self, name: str, place: Placement
+    def _modal_and_section(
+        self, name: str, placement: Placement
     ) -> tuple[ModalNumbers | None, SectionNumbers | None]:
-        """Modes and section of a node of a flexible body."""
+        """Modes and section of a node of a flexible body; None where it has none."""
         passage = self.expanded.passages.get(name)
         body = self.expanded.bodies.get(passage.body if passage else name)
         if body is None:
-            return None, None  # the massless node of the section that is held
+            return None, None  # the massless node of the section at the inboard hinge
         modal = None
         if name in self.expanded.bodies:
             turned = transform_body(body, np.array(place.rotation), np.array(place.origin))
@@ -142,30 +143,34 @@ class Bodies:
             tuple(port.rotation.ravel().tolist()),
         )  # fmt: skip
 
-    def _connection(
-        self, run: BodyRow, k: int, inboard: Matrix, own: Placement, axial: bool
+    def _link_and_connection(
+        self, run: BodyRow, k: int, inboard: Matrix, placement: Placement, axial: bool
     ) -> tuple[Numbers, Numbers]:
-        """Way from the parent's frame, as a link where it is one (else that is empty) and as Rt and
-        ro."""
+        """Transform from the parent's frame as link screws (may be empty) and as Rt, ro."""
         hinge = self.scene.hinges[run.hinge + k]
-        parent, parent_place = self._parent(run, k)
-        turned, point = frame_placement.connection(parent_place, parent, hinge, inboard, own)
-        link = denavit_hartenberg.link_screws(turned, point) if axial else None
+        parent, parent_placement = self._parent(run, k)
+        rotation, position = frame_placement.connection(
+            parent_placement, parent, hinge, inboard, placement
+        )
+        link = denavit_hartenberg.link_screws(rotation, position) if axial else None
         if link is None:
-            return (), (*turned[0], *turned[1], *turned[2], *point)
+            return (), (*rotation[0], *rotation[1], *rotation[2], *position)
         return link, link_connection(link)
 
-    def _child(self, run: BodyRow, k: int) -> tuple[Hinge, Pose] | None:
-        """First hinge on a body, and where the end that it hangs on lies in the body's axes."""
+    def _first_child(self, run: BodyRow, k: int) -> tuple[Hinge, Pose] | None:
+        """First hinge on a body, and the pose of its inboard end in the body's axes."""
         if k + 1 < run.count:
             body, end = self.scene.bodies[run.body + k], run.ends[k % len(run.ends)]
             return self.scene.hinges[run.hinge + k + 1], end_pose(body, end)
-        found = self._first_children.get(run.place + k)
-        if found is None:
+        child = self._first_children.get(run.place + k)
+        if child is None:
             return None
-        held = end_pose(self.scene.bodies[found.on], found.inboard_end)
-        pose = self.carried.poses.get(found.on)
-        return self.scene.hinges[found.hinge], held if pose is None else pose.then(held)
+        inboard_end = end_pose(self.scene.bodies[child.on], child.inboard_end)
+        pose = self.carried.poses.get(child.on)
+        return (
+            self.scene.hinges[child.hinge],
+            inboard_end if pose is None else pose.then(inboard_end),
+        )
 
     def _period(self, run: BodyRow) -> int:
         if run.body < len(self.scene.body):
@@ -174,43 +179,47 @@ class Bodies:
 
     @cached_property
     def _first_children(self) -> dict[int, BodyRow]:
-        """Place of a body -> the first run that hangs on it."""
-        found: dict[int, BodyRow] = {}
+        """Position of a body in the tree -> first run outboard of it."""
+        first: dict[int, BodyRow] = {}
         for run in self.topology.runs:
-            found.setdefault(run.parent, run)
-        return found
+            first.setdefault(run.parent, run)
+        return first
 
     def _parent(self, run: BodyRow, k: int) -> tuple[Body | None, Placement]:
+        """Parent of member k (None: the ground) and its placement."""
         if k:
-            before = self._placements[run.body][(k - 1) % self._period(run)]
-            return self.scene.bodies[run.body + k - 1], before
+            placement = self._placements[run.body][(k - 1) % self._period(run)]
+            return self.scene.bodies[run.body + k - 1], placement
         if run.parent < 0:
             return None, GROUND
         return self.scene.bodies[run.on], self.placement(run.on)
 
-    def _body_parameters(self, number: int, place: Placement) -> tuple[Numbers, Numbers]:
-        """Numbers of the body's kernels, and behind them the internal frame in the body's own:
-        rotation (9) and origin (3); a rigid body's numbers are in the internal frame, with those of
-        the bodies that it carries."""
+    def _body_parameters(self, number: int, placement: Placement) -> tuple[Numbers, Numbers]:
+        """Numbers of the body's kernels, and the internal frame in user axes.
+
+        A rigid body's numbers are given in the internal frame, include the bodies welded to it, and
+        need no frame (empty).  For user-defined bodies it is rotation (9) and origin (3).
+        """
         body = self.scene.bodies[number]
         if body.type == RIGID:
-            numbers = rigid_parameters(body, place)
+            numbers = rigid_parameters(body, placement)
             for part in self.carried.parts.get(number, ()):
-                own = rigid_parameters(self.scene.body[part], self.carried.placed(part, place))
-                numbers = tuple(a + b for a, b in zip(numbers, own, strict=True))
+                part_placement = self.carried.placed(part, placement)
+                part_numbers = rigid_parameters(self.scene.body[part], part_placement)
+                numbers = tuple(a + b for a, b in zip(numbers, part_numbers, strict=True))
             return numbers, ()
         element = self.elements.get("body", body.type, body.name)
         numbers = declared_numbers(element.declared, body.parameters, f'body "{body.name}"')
-        turn = place.rotation
-        return numbers, (*turn[0], *turn[1], *turn[2], *place.origin)
+        rotation = placement.rotation
+        return numbers, (*rotation[0], *rotation[1], *rotation[2], *placement.origin)
 
 
-#: Rt (9) and ro (3) of a connection that is none but its section.
-_UNMOVED: Numbers = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+#: Rt (9) and ro (3) where the section of a flexible body is the whole connection.
+_IDENTITY_CONNECTION: Numbers = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def _rotor_and_imposed(hinge: Hinge, slots: HingeSlots) -> tuple[Numbers, tuple[int, ...]]:
-    """Inertia of rotors, and 1 where something imposes the speed."""
+    """Rotor inertia of each speed (kg m^2 or kg), and 1 for each prescribed speed."""
     rotor, law = (0.0,) * slots.nu, hinge.law
     if hinge.is_weld:
         return rotor, (1,) * slots.nu
@@ -220,8 +229,8 @@ def _rotor_and_imposed(hinge: Hinge, slots: HingeSlots) -> tuple[Numbers, tuple[
     return rotor, tuple(int(entry is not None) for entry in drives)
 
 
-def _modal(body: ModalBody, slots: HingeSlots) -> ModalNumbers:
-    """Of a body whose numbers are in the axes of its node."""
+def _modal_numbers(body: ModalBody, slots: HingeSlots) -> ModalNumbers:
+    """Modal numbers of a flexible body given in the axes of its frame node."""
     return ModalNumbers(
         len(body.modes), slots.q, slots.u,
         Arrays(moment_inputs(without_mass(body) if body.points else body)),
@@ -231,10 +240,11 @@ def _modal(body: ModalBody, slots: HingeSlots) -> ModalNumbers:
 
 
 def _hinge_parameters(hinge: Hinge) -> Numbers:
-    """Numbers of the hinge's kernel: of keys of the scene, and given by name."""
+    """Parameters of the hinge's kernel: from scene keys, and from the table `parameters`."""
     if hinge.facts is None:
         return ()
-    own = hinge.facts.own_parameters()
-    given = declared_numbers(own, hinge.parameters, f'hinge "{hinge.name}"')
-    known = {**dict(zip((p.name for p in own), given, strict=True)), **parameters_from_keys(hinge)}
-    return tuple(known[p.name] for p in hinge.facts.parameters)
+    declared = hinge.facts.own_parameters()
+    numbers = declared_numbers(declared, hinge.parameters, f'hinge "{hinge.name}"')
+    values = dict(zip((p.name for p in declared), numbers, strict=True))
+    values |= parameters_from_keys(hinge)
+    return tuple(values[p.name] for p in hinge.facts.parameters)

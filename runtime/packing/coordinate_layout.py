@@ -1,4 +1,4 @@
-"""Where a hinge's coordinates and speeds stand in q and u: hinges in the scene's order."""
+"""Layout of q and u: indices and names of the coordinates and speeds of every hinge."""
 
 from __future__ import annotations
 
@@ -14,24 +14,32 @@ from mstmm.array_validation import Integers
 from mstmm.errors import SceneError
 from mstmm.scene import Scene
 
-#: Speeds up to which dense matrices are made: 3 GB a matrix.
-_DENSE = 20_000
-#: Behind the name of a constraint, that of what holds its frame: no scene has such a hinge.
+#: Largest number of speeds for which dense matrices are computed: 3 GB a matrix.
+_MAX_DENSE_SPEEDS = 20_000
+#: Suffix of the hinge that carries the frame of a constraint; no name in a scene has it.
 OF_CONSTRAINT = "/constraint"
 
 
 def check_dense_size(nu: int, what: str) -> None:
-    """SceneError if `what`, a dense matrix with a row and a column per speed, is too large."""
-    if nu > _DENSE:
+    """Raise SceneError if `what`, a dense (nu, nu) matrix, is too large."""
+    if nu > _MAX_DENSE_SPEEDS:
         raise SceneError(
-            f"{what} of {nu} speeds would have {nu**2 * 8 / 1e9:.0f} GB; it is made for up to "
-            f"{_DENSE} speeds (accelerations and simulate have no such limit)"
+            f"{what}: {nu} speeds need {nu**2 * 8 / 1e9:.0f} GB, expected at most "
+            f"{_MAX_DENSE_SPEEDS} speeds; use accelerations or simulate, which have no such limit"
         )
 
 
 @dataclass(frozen=True)
 class HingeSlots:
-    """Place and names of one hinge's coordinates and speeds."""
+    """Indices, names and units of one hinge's coordinates and speeds.
+
+    Attributes:
+        q, u: first index in q and in u.
+        quaternion: first quaternion entry within the hinge, None without one.
+        straight: whether the speeds are the rates of the coordinates.
+        steady: whether the motion subspace is constant in the outboard body.
+        turning: whether it is constant and purely rotational.
+    """
 
     name: str
     type: str
@@ -41,10 +49,10 @@ class HingeSlots:
     q_units: tuple[str, ...]
     u_names: tuple[str, ...]
     u_units: tuple[str, ...]
-    quaternion: int | None  # first quaternion entry within the hinge
-    straight: bool  # the speeds are the rates of the coordinates
-    steady: bool  # the motions are the same in every position, seen from the outboard body
-    turning: bool  # and they are turns alone
+    quaternion: int | None
+    straight: bool
+    steady: bool
+    turning: bool
 
     @property
     def nq(self) -> int:
@@ -65,10 +73,13 @@ class HingeSlots:
 
 @dataclass(frozen=True)
 class Group:
-    """Hinges that repeat a pattern: one hinge of its own, or those of a chain.
+    """Hinges that repeat a pattern: a single hinge, or those of a chain.
 
-    `hinges` are the pattern with its places in q and u, `nq` and `nu` its length; `first` is the
-    number of the first hinge, `count` how many there are.
+    Attributes:
+        first: number of the first hinge.
+        count: number of hinges.
+        hinges: slots of the first repeat of the pattern.
+        nq, nu: numbers of coordinates and speeds of one repeat.
     """
 
     first: int
@@ -86,38 +97,42 @@ class Group:
         return self.hinges[0].u
 
     def q_places(self) -> Integers:
-        """First coordinate of every hinge."""
-        return self._spread([h.q for h in self.hinges], self.nq)
+        """Index of the first coordinate of every hinge."""
+        return self._repeat([h.q for h in self.hinges], self.nq)
 
     def u_places(self) -> Integers:
-        """First speed of every hinge."""
-        return self._spread([h.u for h in self.hinges], self.nu)
+        """Index of the first speed of every hinge."""
+        return self._repeat([h.u for h in self.hinges], self.nu)
 
     def quaternions(self) -> Integers:
-        """First quaternion entry of every hinge that has one."""
-        there = np.array([h.quaternion is not None for h in self.hinges])
+        """Index of the first quaternion entry of every hinge that has a quaternion."""
+        has_quaternion = np.array([h.quaternion is not None for h in self.hinges])
         first = [h.q + (h.quaternion or 0) for h in self.hinges]
         k = np.arange(self.count)
-        return self._spread(first, self.nq)[there[k % len(self.hinges)]]
+        return self._repeat(first, self.nq)[has_quaternion[k % len(self.hinges)]]
 
-    def _spread(self, pattern: Sequence[int], length: int) -> Integers:
+    def _repeat(self, pattern: Sequence[int], length: int) -> Integers:
+        """Indices (count,) of a pattern whose repeats are `length` entries apart."""
         if self.count == 1:
             return np.array(pattern, dtype=np.int64)
         k = np.arange(self.count)
-        repeats, which = np.divmod(k, len(self.hinges))
-        return np.asarray(np.array(pattern, dtype=np.int64)[which] + repeats * length)
+        repeats, member = np.divmod(k, len(self.hinges))
+        return np.asarray(np.array(pattern, dtype=np.int64)[member] + repeats * length)
 
 
-def _shown(name: str) -> str:
-    """The name under which users know what has coordinates."""
+def _user_name(name: str) -> str:
+    """Name of a hinge or constraint as the user wrote it."""
     return name.removesuffix(OF_CONSTRAINT)
 
 
 class Layout:
-    """Layout of q (nq) and u (nu) by hinge: the scene's hinges, then those of its chains.
+    """Layout of q (nq,) and u (nu,): the scene's hinges, those of its chains, then the modes.
 
-    `hinges` gives the slots of a hinge by its name; of chains they are made when asked for.
-    `inputs` are the places of inputs and signals among them by their names.
+    Attributes:
+        hinges: hinge name -> slots; those of chains are computed on access.
+        modal: flexible body -> slots of its modal coordinates.
+        internal: numbers of the hinges that belong to sections of flexible bodies or constraints.
+        inputs: name of an input or signal -> its number.
     """
 
     def __init__(
@@ -131,33 +146,30 @@ class Layout:
         inputs: Iterable[str] = (),
     ) -> None:
         self.groups, self.nq, self.nu = groups, nq, nu
-        #: Slots of the modal coordinates of flexible bodies, behind those of all hinges.
         self.modal: Mapping[str, HingeSlots] = modal or {}
-        #: Numbers of hinges that stand for sections of flexible bodies.
         self.internal = internal
-        self.inputs = {name: place for place, name in enumerate(inputs)}
+        self.inputs = {name: number for number, name in enumerate(inputs)}
         self._numbers, self._names = scene.hinges, scene.names
-        self.hinges: Mapping[str, HingeSlots] = _ByName(self)
+        self.hinges: Mapping[str, HingeSlots] = _SlotsByName(self)
 
     def __len__(self) -> int:
         return len(self._numbers)
 
     def group(self, hinge: int) -> Group:
-        """The group to which the hinge of this number belongs."""
+        """Group of a hinge, given by its number."""
         return self.groups[bisect_right(self._firsts, hinge) - 1]
 
     def slots(self, hinge: int) -> HingeSlots:
-        """Slots of the hinge of this number."""
+        """Slots of a hinge, given by its number."""
         group = self.group(hinge)
-        k = hinge - group.first
         if group.count == 1:
             return group.hinges[0]
-        repeats, which = divmod(k, len(group.hinges))
-        one = group.hinges[which]
+        repeats, member = divmod(hinge - group.first, len(group.hinges))
+        slots = group.hinges[member]
         return HingeSlots(
-            self._numbers.name(hinge), one.type, one.q + repeats * group.nq,
-            one.u + repeats * group.nu, one.q_names, one.q_units, one.u_names, one.u_units,
-            one.quaternion, one.straight, one.steady, one.turning,
+            self._numbers.name(hinge), slots.type, slots.q + repeats * group.nq,
+            slots.u + repeats * group.nu, slots.q_names, slots.q_units, slots.u_names,
+            slots.u_units, slots.quaternion, slots.straight, slots.steady, slots.turning,
         )  # fmt: skip
 
     @cached_property
@@ -166,110 +178,110 @@ class Layout:
 
     @cached_property
     def q_places(self) -> Integers:
-        """First coordinate of every hinge, by number."""
-        return _joined([group.q_places() for group in self.groups])
+        """Index of the first coordinate of every hinge."""
+        return _concatenate([group.q_places() for group in self.groups])
 
     @cached_property
     def u_places(self) -> Integers:
-        """First speed of every hinge, by number."""
-        return _joined([group.u_places() for group in self.groups])
+        """Index of the first speed of every hinge."""
+        return _concatenate([group.u_places() for group in self.groups])
 
     @property
     def q_names(self) -> list[str]:
-        """`hinge.coordinate` for every entry of q."""
+        """Names `hinge.coordinate` of all entries of q."""
         return [f"{h.name}.{n}" for h in self.owners for n in h.q_names]
 
     @property
     def u_names(self) -> list[str]:
-        """`hinge.speed` for every entry of u."""
+        """Names `hinge.speed` of all entries of u."""
         return [f"{h.name}.{n}" for h in self.owners for n in h.u_names]
 
     @property
     def owners(self) -> Iterator[HingeSlots]:
-        """Slots of everything that has coordinates, in their order: hinges, constraints with
-        coordinates of their own by their names, flexible bodies."""
+        """Slots of all owners of coordinates: hinges, curve constraints, flexible bodies."""
         yield from self.hinges.values()
         for number in self.internal:
             slots = self.slots(number)
             if slots.nq:
-                yield replace(slots, name=_shown(slots.name))
+                yield replace(slots, name=_user_name(slots.name))
         yield from self.modal.values()
 
     def along(self, constraint: str) -> HingeSlots:
-        """Slots of a point's way along the curve of a constraint."""
-        ways = (self.slots(number) for number in self.internal)
-        return next(one for one in ways if one.name == f"{constraint}{OF_CONSTRAINT}")
+        """Slots of the curve parameter of a constraint."""
+        internal_slots = (self.slots(number) for number in self.internal)
+        name = f"{constraint}{OF_CONSTRAINT}"
+        return next(slots for slots in internal_slots if slots.name == name)
 
-    def _modal_at(self, entry: int, letter: str) -> HingeSlots | None:
-        """The flexible body to which an entry of q or u belongs."""
+    def _modal_slots(self, entry: int, quantity: str) -> HingeSlots | None:
+        """Slots of the flexible body that owns an entry of "q" or "u"; None if none does."""
         for slots in self.modal.values():
-            if 0 <= entry - getattr(slots, letter) < slots.nq:
+            if 0 <= entry - getattr(slots, quantity) < slots.nq:
                 return slots
         return None
 
     def q_name(self, entry: int) -> str:
-        """`hinge.coordinate` of one entry of q."""
-        slots = self._modal_at(entry, "q")
+        """Name `hinge.coordinate` of an entry of q."""
+        slots = self._modal_slots(entry, "q")
         if slots is None:
             slots = self.slots(int(np.searchsorted(self.q_places, entry, side="right")) - 1)
-        return f"{_shown(slots.name)}.{slots.q_names[entry - slots.q]}"
+        return f"{_user_name(slots.name)}.{slots.q_names[entry - slots.q]}"
 
     def u_name(self, entry: int) -> str:
-        """`hinge.speed` of one entry of u."""
+        """Name `hinge.speed` of an entry of u."""
         slots = self.hinge_of_speed(entry)
-        return f"{_shown(slots.name)}.{slots.u_names[entry - slots.u]}"
+        return f"{_user_name(slots.name)}.{slots.u_names[entry - slots.u]}"
 
     def hinge_of_speed(self, entry: int) -> HingeSlots:
-        """The hinge, or flexible body, to which an entry of u belongs."""
-        return self._modal_at(entry, "u") or self.slots(
+        """Slots of the hinge or flexible body that owns an entry of u."""
+        return self._modal_slots(entry, "u") or self.slots(
             int(np.searchsorted(self.u_places, entry, side="right")) - 1
         )
 
     @cached_property
     def quaternions(self) -> Integers:
-        """First index in q of every unit quaternion (w, x, y, z)."""
-        return _joined([group.quaternions() for group in self.groups])
+        """Index in q of the first entry of every unit quaternion (w, x, y, z)."""
+        return _concatenate([group.quaternions() for group in self.groups])
 
     @cached_property
     def q_by_unit(self) -> dict[str, Integers]:
-        """Unit -> entries of q that have it, those of quaternions left out."""
-        found: dict[str, list[Integers]] = {}
+        """Unit -> indices of the entries of q that have it, without quaternions."""
+        indices: dict[str, list[Integers]] = {}
         for group in self.groups:
             places = group.q_places()
             for j, hinge in enumerate(group.hinges[: group.count]):
-                first, turn = places[j :: len(group.hinges)], hinge.quaternion
+                first, quaternion = places[j :: len(group.hinges)], hinge.quaternion
                 for k, unit in enumerate(hinge.q_units):
-                    if turn is None or not turn <= k < turn + 4:
-                        found.setdefault(unit, []).append(first + k)
-        return self._with_modes(found, "q")
+                    if quaternion is None or not quaternion <= k < quaternion + 4:
+                        indices.setdefault(unit, []).append(first + k)
+        return self._with_modes(indices, "q")
 
     @cached_property
     def u_by_unit(self) -> dict[str, Integers]:
-        """Unit -> entries of u that have it."""
-        found: dict[str, list[Integers]] = {}
+        """Unit -> indices of the entries of u that have it."""
+        indices: dict[str, list[Integers]] = {}
         for group in self.groups:
             places = group.u_places()
             for j, hinge in enumerate(group.hinges[: group.count]):
                 first = places[j :: len(group.hinges)]
                 for k, unit in enumerate(hinge.u_units):
-                    found.setdefault(unit, []).append(first + k)
-        return self._with_modes(found, "u")
+                    indices.setdefault(unit, []).append(first + k)
+        return self._with_modes(indices, "u")
 
-    def _with_modes(self, found: dict[str, list[Integers]], kind: str) -> dict[str, Integers]:
-        """The entries found of hinges joined with those of flexible bodies."""
+    def _with_modes(self, indices: dict[str, list[Integers]], quantity: str) -> dict[str, Integers]:
+        """Indices by unit of the hinges joined with those of the modes, in ascending order."""
         for body in self.modal.values():
-            start, units = (body.q, body.q_units) if kind == "q" else (body.u, body.u_units)
+            start, units = (body.q, body.q_units) if quantity == "q" else (body.u, body.u_units)
             for k, unit in enumerate(units, start):
-                found.setdefault(unit, []).append(np.array([k]))
-        return {unit: np.sort(np.concatenate(parts)) for unit, parts in found.items()}
+                indices.setdefault(unit, []).append(np.array([k]))
+        return {unit: np.sort(np.concatenate(parts)) for unit, parts in indices.items()}
 
 
-def _joined(parts: list[Integers]) -> Integers:
+def _concatenate(parts: list[Integers]) -> Integers:
     return np.concatenate(parts) if parts else np.zeros(0, dtype=np.int64)
 
 
 class StateNames(Sequence[str]):
-    """What the components of an integrator's state are: q, u and perhaps the work."""
+    """Names of the components of an integrator's state: q, u and possibly the work."""
 
     def __init__(self, layout: Layout, with_work: bool) -> None:
         self.layout, self.with_work = layout, with_work
@@ -292,17 +304,16 @@ class StateNames(Sequence[str]):
         return f"speed {self.layout.u_name(index - nq)}" if index < nq + nu else "work"
 
 
-class _ByName(Mapping[str, HingeSlots]):
-    """Slots by the hinge's name, also that of `[names]`; those of a flexible body by its name,
-    though not listed."""
+class _SlotsByName(Mapping[str, HingeSlots]):
+    """Slots by hinge name; names of `[names]` and of flexible bodies are found, but not listed."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout = layout
 
     def __getitem__(self, name: str) -> HingeSlots:
         layout = self.layout
-        for one in dict.fromkeys((name, layout._names.of_hinge(name))):
-            number = layout._numbers.find(one)
+        for candidate in dict.fromkeys((name, layout._names.of_hinge(name))):
+            number = layout._numbers.find(candidate)
             if number is not None and number not in layout.internal:
                 return layout.slots(number)
         return layout.modal[name]
@@ -317,14 +328,14 @@ class _ByName(Mapping[str, HingeSlots]):
         return len(self.layout) - len(self.layout.internal)
 
     def values(self) -> ValuesView[HingeSlots]:
-        """All slots; faster than by their names."""
-        return _Values(self)
+        """Slots of all hinges; faster than a lookup of each name."""
+        return _SlotsView(self)
 
 
-class _Values(ValuesView[HingeSlots]):
+class _SlotsView(ValuesView[HingeSlots]):
     """Slots in the order of the hinges."""
 
-    def __init__(self, slots: _ByName) -> None:
+    def __init__(self, slots: _SlotsByName) -> None:
         super().__init__(slots)
         self.layout = slots.layout
 

@@ -1,4 +1,4 @@
-"""Expressions of a scene -> tapes over t, q, u and inputs: efforts, loads, drives, events."""
+"""Kernels and tapes of a scene's expressions over t, q, u and inputs."""
 
 from __future__ import annotations
 
@@ -23,46 +23,46 @@ if TYPE_CHECKING:
 
 Resolver = Callable[[Name], Node]
 
-#: Inputs that stand for numbers which carry derivatives.
+#: Port of the numbers that carry derivatives.
 MOVING = "moving"
 Moving = Sequence[Port]
 
 
 class Values:
-    """Numbers that expressions give at (t, q, u): each is asked for once and known by its place."""
+    """Values of expressions at (t, q, u); equal expressions share one index."""
 
     def __init__(self, layout: Layout, moving: Moving = ()) -> None:
         self.layout, self._moving = layout, moving
         self._graph = Graph()
         self._nodes: list[Node] = []
-        self._places: dict[int, int] = {}
+        self._indices: dict[int, int] = {}
 
     def place(self, expression: Expression, own: Hinge | None = None) -> int:
-        """Place of the expression's value; -1 for the constant zero."""
+        """Index of the expression's value, which is added if it is new; -1 for constant zero."""
         if expression.is_zero:
             return -1
         node = expression.build(self._graph, resolver(self._graph, self.layout, own))
-        if node.number not in self._places:
-            self._places[node.number] = len(self._nodes)
+        if node.number not in self._indices:
+            self._indices[node.number] = len(self._nodes)
             self._nodes.append(node)
-        return self._places[node.number]
+        return self._indices[node.number]
 
     def __len__(self) -> int:
         return len(self._nodes)
 
     def kernel(self) -> KernelIR:
-        """t (1), q, u, inputs -> the values in the order of their places."""
+        """Kernel (t, q, u, inputs) -> all values."""
         inputs = [*state_ports(self.layout), inputs_port(self.layout), *self._moving]
         return values_kernel(self._graph, "values", inputs, self._nodes)
 
 
 def state_ports(layout: Layout) -> list[Port]:
-    """Inputs of every tape that reads the state."""
+    """Ports t, q and u."""
     return [Port("t", (1,)), Port("q", (layout.nq,)), Port("u", (layout.nu,))]
 
 
 def inputs_port(layout: Layout) -> Port:
-    """The numbers of all inputs and signals at t: see `mstmm.numerics.piecewise_polynomial`."""
+    """Port of the inputs and signals: the pieces of `mstmm.numerics.piecewise_polynomial` at t."""
     return Port(INPUTS, (NUMBERS_PER_PIECE * len(layout.inputs),))
 
 
@@ -73,7 +73,11 @@ def resolver(
     length: bool = False,
     probes: dict[tuple[str, str], int] | None = None,
 ) -> Resolver:
-    """Nodes of names: t, inputs, q and u of hinges, parameters, a spring's length, positions."""
+    """Function that builds the graph node of a name.
+
+    Names are t, inputs, q and u of hinges, parameters of the hinge `own`, with `length` those of a
+    spring, and positions and velocities of ends, which are numbered in `probes`.
+    """
 
     def resolve(name: Name) -> Node:
         quantity, index = name.quantity, name.index or 0
@@ -85,11 +89,11 @@ def resolver(
             hinge = name.hinge or (own.name if own else "")
             slots = layout.hinges[hinge]
             first = slots.q if quantity == "q" else slots.u
-            _refuse_beyond(name, hinge, index, slots.q_names if quantity == "q" else slots.u_names)
+            _check_index(name, hinge, index, slots.q_names if quantity == "q" else slots.u_names)
             return graph.element(quantity, first + index)
         if quantity in CURVE_QUANTITIES and name.owner:
-            way, kind = layout.along(name.owner), "qu"[CURVE_QUANTITIES.index(quantity)]
-            return graph.element(kind, getattr(way, kind))
+            slots, port = layout.along(name.owner), "qu"[CURVE_QUANTITIES.index(quantity)]
+            return graph.element(port, getattr(slots, port))
         if quantity in ("q", "u") and length:
             return graph.element("length", 0 if quantity == "q" else 1)
         if own is not None and quantity in own.parameters:
@@ -102,8 +106,11 @@ def resolver(
     return resolve
 
 
-def _refuse_beyond(name: Name, owner: str, index: int, entries: Sequence[str]) -> None:
-    """How many shapes a flexible body has is known only here where `"auto"` chose them."""
+def _check_index(name: Name, owner: str, index: int, entries: Sequence[str]) -> None:
+    """Raise SceneError if an index is too large.
+
+    It is checked here because "auto" chooses the number of shapes only after validation.
+    """
     if index >= len(entries):
         raise SceneError(
             f"{name.text!r}: {owner!r} has {len(entries)} entries: {', '.join(entries) or 'none'}"
@@ -111,13 +118,13 @@ def _refuse_beyond(name: Name, owner: str, index: int, entries: Sequence[str]) -
 
 
 def values_kernel(graph: Graph, name: str, inputs: Sequence[Port], nodes: list[Node]) -> KernelIR:
-    """A kernel with nodes as its one output, "values"."""
+    """Kernel whose only output, "values", holds the nodes."""
     output = Port("values", (len(nodes),))
     return graph.kernel(name, inputs, [output], {"values": nodes})
 
 
 def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: Moving = ()) -> KernelIR:
-    """t, inputs -> position, speed and acceleration of every drive."""
+    """Kernel (t, inputs) -> position, speed and acceleration of every drive."""
     graph = Graph()
     time, resolve = graph.element("t", 0), resolver(graph, layout)
     nodes = [node for drive in drives for node in motion(drive, time, resolve)]
@@ -125,7 +132,7 @@ def drive_kernel(drives: Sequence[Expression], layout: Layout, moving: Moving = 
 
 
 def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> KernelIR:
-    """t, q, u, [length, rate], inputs -> effort of a spring."""
+    """Kernel (t, q, u, [length, rate], inputs) -> effort of a spring."""
     graph = Graph()
     node = effort.build(graph, resolver(graph, layout, length=True))
     inputs = [*state_ports(layout), Port("length", (2,)), inputs_port(layout), *moving]
@@ -133,7 +140,7 @@ def effort_kernel(effort: Expression, layout: Layout, moving: Moving = ()) -> Ke
 
 
 def constant_kernel(name: str, system: System, numbers: Sequence[float]) -> KernelIR:
-    """(t, q, u, [length, rate], inputs) -> the same numbers always."""
+    """Kernel with constant values and the ports of the kernel `name` ("effort" or "values")."""
     graph = Graph()
     ports = [Port("t", (1,)), Port("q", (system.nq,)), Port("u", (system.nu,))]
     ports += [Port("length", (2,))] if name == "effort" else []
@@ -142,7 +149,7 @@ def constant_kernel(name: str, system: System, numbers: Sequence[float]) -> Kern
 
 
 def condition_value(condition: Expression, graph: Graph, resolve: Resolver) -> Node:
-    """Difference of what a comparison compares; >= 0 where it holds."""
+    """Difference of the two sides of a comparison; >= 0 where it holds."""
     comparison = condition.comparison
     assert comparison is not None, condition.text
     left, sign, right = comparison
@@ -157,8 +164,10 @@ def event_tape(
     probes: dict[tuple[str, str], int],
     margins: Sequence[Node],
 ) -> Tape:
-    """t, q, u, positions of the ends in `probes`, inputs -> g per condition, g >= 0 where it holds,
-    and behind them the margins."""
+    """Tape of event functions, >= 0 where their condition holds, followed by the margins.
+
+    Its inputs are t, q, u, positions and velocities of the ends in `probes`, and inputs.
+    """
     nodes = []
     for condition, own in conditions:
         resolve = resolver(graph, layout, own, probes=probes)

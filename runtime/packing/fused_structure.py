@@ -1,4 +1,4 @@
-"""System -> Structure for the fused engine, and the vector p of its run-time numbers."""
+"""Structure of a system for the fused engine, and the vector p of its run-time numbers."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from .loops.loop_structure import with_loops
 from .scene_elements import Elements, Known
 from .system import System
 
-#: Numbers of expressions that decide which terms there are.
+#: Constants in expressions that stay in the structure.
 _STRUCTURAL = frozenset({"0", "1", "-1", "pi"})
 
 
 def structure_of(
     system: System, known: Known, bake: bool = False, floors: Sequence[float] = ()
 ) -> tuple[Structure, NDArray[np.float64]]:
-    """(structure, p) of a system; `known` are elements beyond the prebuilt ones.
+    """(structure, p) of a system; `known` are elements in addition to the prebuilt ones.
 
-    With `bake` every number but those of inputs is part of the structure.  `floors` are those of
-    the rows of closed loops: up to them pivots are rounding.
+    With `bake` all numbers except those of inputs become part of the structure.  `floors` are the
+    pivots of the constraint rows below which they count as rounding.
     """
     structure, numbers = structure_and_numbers(system, known, bake, floors)
     return structure, np.array(numbers)
@@ -41,47 +41,48 @@ def structure_of(
 def structure_and_numbers(
     system: System, known: Known, bake: bool = False, floors: Sequence[float] = ()
 ) -> tuple[Structure, list[Any]]:
-    """The same with p as a list of floats and Duals."""
-    sorting, elements = _Sorting(system, bake), Elements(known)
-    gravity = sorting.entries(system.gravity)
-    bodies = tuple(body for run in system.bodies for body in sorting.bodies(run))
-    bodies, closures, rows, couplings = with_loops(bodies, system, sorting.entries, floors)
-    laws = tuple(law for run in system.laws for law in sorting.laws(run))
-    loads = tuple(map(sorting.load, system.loads))
-    forces = tuple(map(sorting.force, system.forces))
+    """`structure_of` with p as a list of floats and Duals."""
+    builder, elements = _StructureBuilder(system, bake), Elements(known)
+    gravity = builder.entries(system.gravity)
+    bodies = tuple(body for run in system.bodies for body in builder.bodies(run))
+    bodies, closures, rows, couplings = with_loops(bodies, system, builder.entries, floors)
+    laws = tuple(law for run in system.laws for law in builder.laws(run))
+    loads = tuple(map(builder.load, system.loads))
+    forces = tuple(map(builder.force, system.forces))
     used = {key for body in bodies for key in (body.hinge, body.body)}
     used |= {force.element for force in forces}
-    values, prescribed = sorting.expression(system.values), sorting.expression(system.drives)
-    coupled = sorting.expression(system.coupled)
-    read = tuple(sorted(sorting.inputs.items()))
+    values, prescribed = builder.expression(system.values), builder.expression(system.drives)
+    coupled = builder.expression(system.coupled)
+    inputs = tuple(sorted(builder.inputs.items()))
     structure = Structure(
-        system.nq, system.nu, len(sorting.numbers), system.held.first, gravity, bodies, laws, loads,
+        system.nq, system.nu, len(builder.numbers), system.held.first, gravity, bodies, laws, loads,
         forces, values, prescribed, system.driven, closures, rows, couplings,
-        coupled, {key: elements[key].hash for key in sorted(used)}, read,
+        coupled, {key: elements[key].hash for key in sorted(used)}, inputs,
     )  # fmt: skip
-    return structure, sorting.numbers
+    return structure, builder.numbers
 
 
-class _Sorting:
-    """Sorts the numbers of a system into structural constants and places in p."""
+class _StructureBuilder:
+    """Sorts the numbers of a system into structural constants and indices of p."""
 
     def __init__(self, system: System, bake: bool) -> None:
         self.moving, self.bake = system.moving, bake
         self.numbers: list[Any] = []
-        self._start = [x for one in system.inputs for x in one.at(0.0)]
-        #: Place in p of every number of inputs that is read, by its place among them.
+        self._inputs_at_zero = [x for channel in system.inputs for x in channel.at(0.0)]
+        #: Index among the numbers of all inputs -> index in p, for those that are read.
         self.inputs: dict[int, int] = {}
 
     def entries(self, values: Iterable[float], axes: bool = False) -> Entries:
-        """Zeros, and +-1 of axes, are structure; the rest goes to p."""
+        """Sort numbers: zeros, and +-1 of axes, into the structure, all others into p."""
         return tuple(self._entry(to_real(value), axes) for value in values)
 
     def _entry(self, value: float, axes: bool) -> Entry:
         if value == 0.0 or (axes and abs(value) == 1.0):
-            return value_of(value) + 0.0  # -0.0 and 0.0 are one structure
-        return self._place(value)
+            return value_of(value) + 0.0  # -0.0 and 0.0 must give the same structure
+        return self._parameter(value)
 
-    def _place(self, value: float) -> Entry:
+    def _parameter(self, value: float) -> Entry:
+        """Index of a new number of p, or the number itself with `bake`."""
         if self.bake:
             return value
         self.numbers.append(value)
@@ -90,46 +91,46 @@ class _Sorting:
     # --- expressions --------------------------------------------------------------------------
 
     def expression(self, kernel: KernelIR | None) -> code.ExpressionStructure | None:
-        """Expressions of the scene with their numbers taken out; None if there are none."""
+        """Expressions of the scene with their numbers as inputs; None if there are none."""
         if kernel is None:
             return None
-        found: list[Entry] = []
+        constants: list[Entry] = []
 
-        def taken(operand: Operand) -> Operand:
+        def generalise(operand: Operand) -> Operand:
             if isinstance(operand, ir.Element) and operand.port == INPUTS:
-                found.append(self._input(int(operand.index[0])))
+                constants.append(self._input(int(operand.index[0])))
             elif isinstance(operand, ir.Element) and operand.port == MOVING:
-                found.append(self._place(self.moving[int(operand.index[0])]))
+                constants.append(self._parameter(self.moving[int(operand.index[0])]))
             elif isinstance(operand, ir.Constant) and operand.text not in _STRUCTURAL:
-                found.append(self._place(operand.number))
+                constants.append(self._parameter(operand.number))
             else:
                 return operand
-            return ir.Element("constants", (len(found) - 1,))
+            return ir.Element("constants", (len(constants) - 1,))
 
         statements: list[Statement] = []
         for statement in kernel.statements:
             if isinstance(statement, ir.Assign):
-                statements.append(replace(statement, args=tuple(map(taken, statement.args))))
+                statements.append(replace(statement, args=tuple(map(generalise, statement.args))))
             elif isinstance(statement, ir.Store):
-                statements.append(replace(statement, value=taken(statement.value)))
+                statements.append(replace(statement, value=generalise(statement.value)))
             else:
                 statements.append(statement)
         inputs = [port for port in kernel.inputs if port.name not in (INPUTS, MOVING)]
-        inputs.append(Port("constants", (len(found),)))
+        inputs.append(Port("constants", (len(constants),)))
         general = KernelIR(kernel.name, tuple(inputs), kernel.outputs, tuple(statements))
-        return code.ExpressionStructure(general, tuple(found))
+        return code.ExpressionStructure(general, tuple(constants))
 
     def _input(self, entry: int) -> int:
-        """Place in p of a number of inputs: the same wherever it is read."""
+        """Index in p of a number of inputs; all its readers share it."""
         if entry not in self.inputs:
             self.inputs[entry] = len(self.numbers)
-            self.numbers.append(self._start[entry])
+            self.numbers.append(self._inputs_at_zero[entry])
         return self.inputs[entry]
 
     # --- bodies -------------------------------------------------------------------------------
 
     def bodies(self, run: given.BodyRun) -> Iterable[code.BodyStructure]:
-        """Every body of a run."""
+        """Structures of all bodies of a run."""
         places = zip(run.slots.q_places().tolist(), run.slots.u_places().tolist(), strict=True)
         for k, (q, u) in enumerate(places):
             yield self._body(run.member(k), run.place + k - 1 if k else run.parent, q, u)
@@ -147,9 +148,9 @@ class _Sorting:
         )  # fmt: skip
 
     def _link(self, body: given.BodyNumbers) -> Entries:
-        """Screws about x and z of a connection between axial hinges; empty if it is none.
+        """Screws about x and z of a connection between axial hinges; empty if there are none.
 
-        A slide has no coordinate that could take up a constant angle about z.
+        A constant angle about z needs a rotation coordinate, which prismatic hinges do not have.
         """
         if not body.link or (code.rotation_coordinate(body.hinge) is None and body.link[3] != 0.0):
             return ()
@@ -160,7 +161,7 @@ class _Sorting:
         return tuple((name, self.entries(array.ravel().tolist())) for name, array in named)
 
     def _modal(self, modal: given.ModalNumbers | None) -> code.ModalStructure | None:
-        """Modes of a flexible body; None for a body without."""
+        """Modes of a flexible body; None for other bodies."""
         if modal is None:
             return None
         drag = () if modal.drag is None else self._arrays(modal.drag)
@@ -168,7 +169,7 @@ class _Sorting:
         return code.ModalStructure(modal.n, modal.q, modal.u, moments, drag, **matrices)
 
     def _section(self, section: given.SectionNumbers | None) -> code.SectionStructure | None:
-        """Section that a body's connection passes; None where it passes none."""
+        """Section of a flexible body in a body's connection; None without one."""
         if section is None:
             return None
         return code.SectionStructure(
@@ -179,7 +180,7 @@ class _Sorting:
     # --- laws, loads, forces --------------------------------------------------------------------
 
     def laws(self, run: given.LawRun) -> Iterable[code.LawStructure]:
-        """Every law of a run."""
+        """Structures of all laws of a run."""
         for law, body, twist, effort in run.each():
             yield code.LawStructure(
                 body, law.kernel, law.coordinate, law.speed, law.n, twist, self.entries(law.p),
@@ -187,14 +188,14 @@ class _Sorting:
             )  # fmt: skip
 
     def load(self, load: given.LoadNumbers) -> code.LoadStructure:
-        """A load."""
+        """Structure of a load."""
         return code.LoadStructure(
             load.body, load.axes, self.entries(load.axes_own, axes=True),
             self.entries(load.offset), load.force, load.moment,
         )  # fmt: skip
 
     def force(self, force: given.ForceNumbers) -> code.ForceStructure:
-        """A spring."""
+        """Structure of a force element."""
         (body_f, axes_f, offset_f), (body_t, axes_t, offset_t) = force.ends
         return code.ForceStructure(
             force.element, body_f, body_t, self.entries(axes_f, axes=True),

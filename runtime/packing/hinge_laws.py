@@ -1,4 +1,4 @@
-"""Hinge laws -> which law kernel acts on which speeds, with what numbers."""
+"""Law kernels of the hinges: which one acts on which speeds, with which parameters."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .coordinate_layout import HingeSlots, Layout
 from .expression_tapes import Values
 from .system import LawNumbers, LawRun, Numbers, Places
 
-_NOTHING = number(0)
+_ZERO = number(0)
 
-#: Bounds that no coordinate reaches, for a stop on one side only.
-_FAR = 1e300
+#: Bound that no coordinate reaches, for a stop on one side only.
+_UNREACHABLE = 1e300
 
 
 class Draft(NamedTuple):
-    """A law of `member` in the pattern, whose places are not known yet, with one effort a speed."""
+    """Law on hinge `member` of a pattern, with one effort expression per speed."""
 
     member: int
     kernel: str
@@ -36,57 +36,59 @@ class Draft(NamedTuple):
 def law_runs(
     scene: Scene, topology: Topology, layout: Layout, values: Values, memory: int
 ) -> Iterator[LawRun]:
-    """The laws of every run that has some; those that remember turns do so from `memory` on.
+    """Laws of all runs that have any.
 
-    Of a chain the laws of one period of its pattern are made.
+    Of a chain one period of its pattern is computed.  Laws that track a rotation angle store it in
+    memory from index `memory` on.
     """
     for run in topology.runs:
-        chained = run.body >= len(scene.body)
-        period = scene.chain[scene.bodies.member(run.body)[0]].period if chained else 1
+        is_chain = run.body >= len(scene.body)
+        period = scene.chain[scene.bodies.member(run.body)[0]].period if is_chain else 1
         period = min(period, run.count)
-        pattern = [draft for k in range(period) for draft in _member(scene, layout, run, k)]
+        pattern = [draft for k in range(period) for draft in _member_laws(scene, layout, run, k)]
         if pattern:
-            made = _repeated(scene, values, run, period, pattern, memory)
-            memory = made.next_twist
-            yield made
+            law_run = _repeat_pattern(scene, values, run, period, pattern, memory)
+            memory = law_run.next_twist
+            yield law_run
 
 
-def _member(scene: Scene, layout: Layout, run: BodyRow, k: int) -> list[Draft]:
+def _member_laws(scene: Scene, layout: Layout, run: BodyRow, k: int) -> list[Draft]:
     """Laws of the hinge of member k."""
     hinge, slots = scene.hinges[run.hinge + k], layout.slots(run.hinge + k)
     if slots.nu == 0 or hinge.is_weld:
         return []
-    if slots.quaternion is None or not _is_known(hinge):
-        return _coordinates(hinge, slots, k)
-    return _rotational(hinge, slots, k)
+    if slots.quaternion is None or not _is_built_in(hinge):
+        return _coordinate_laws(hinge, slots, k)
+    return _rotational_laws(hinge, slots, k)
 
 
-def _repeated(
+def _repeat_pattern(
     scene: Scene, values: Values, run: BodyRow, period: int, pattern: list[Draft], twist: int
 ) -> LawRun:
-    """A pattern repeated along a run, with the places of its efforts and turns."""
+    """Repeat a pattern along a run and find the indices of its efforts and rotation angles."""
     repeats, rest = divmod(run.count, period)
     count = repeats * len(pattern) + sum(draft.member < rest for draft in pattern)
     common = ("t", *scene.channels)
-    own = [any(_reads_its_own(effort, common) for effort in draft.efforts) for draft in pattern]
+    varies = [any(_is_hinge_specific(e, common) for e in draft.efforts) for draft in pattern]
     places: list[list[Places]] = [[] for _ in pattern]
-    for row in range(count if any(own) else len(pattern)):
-        repeat, which = divmod(row, len(pattern))
-        if repeat == 0 or own[which]:
-            draft = pattern[which]
+    for row in range(count if any(varies) else len(pattern)):
+        repeat, k = divmod(row, len(pattern))
+        if repeat == 0 or varies[k]:
+            draft = pattern[k]
             hinge = scene.hinges[run.hinge + repeat * period + draft.member]
-            places[which].append(tuple(values.place(effort, hinge) for effort in draft.efforts))
+            places[k].append(tuple(values.place(effort, hinge) for effort in draft.efforts))
     laws, turns = [], 0
-    for draft, found in zip(pattern, places, strict=True):
+    for draft, effort_places in zip(pattern, places, strict=True):
         member, kernel, coordinate, speed, p, efforts, axes = draft
         turn, n = turns if axes else -1, len(efforts)
         turns += bool(axes)
-        laws.append(LawNumbers(member, kernel, coordinate, speed, n, turn, p, axes, tuple(found)))
+        per_repeat = tuple(effort_places)
+        laws.append(LawNumbers(member, kernel, coordinate, speed, n, turn, p, axes, per_repeat))
     return LawRun(run.place, count, period, tuple(laws), twist)
 
 
-def _reads_its_own(effort: Expression, common: Collection[str]) -> bool:
-    """True where an expression has a name that means something else in every hinge."""
+def _is_hinge_specific(effort: Expression, common: Collection[str]) -> bool:
+    """Whether an expression has a name whose meaning depends on the hinge."""
     return any(len(name.parts) == 1 and name.text not in common for name in effort.names)
 
 
@@ -94,48 +96,54 @@ def _acts(entry: LawEntry) -> bool:
     return bool(entry.stiffness or entry.damping or not entry.effort.is_zero)
 
 
-def _coordinates(hinge: Hinge, slots: HingeSlots, member: int) -> list[Draft]:
-    """One law per coordinate on which something acts."""
-    made = []
+def _coordinate_laws(hinge: Hinge, slots: HingeSlots, member: int) -> list[Draft]:
+    """One law for each coordinate with a spring, damper, effort, friction or elastic stop."""
+    laws = []
     for k in range(slots.nu):
         entry = hinge.law.entry(k)
         full = entry.friction.acts or entry.limits.yields
         if not (_acts(entry) or full):
             continue
-        p = (entry.stiffness, entry.rest, entry.damping, *(_full(entry) if full else ()))
-        made.append(Draft(member, "full" if full else "linear", k, k, p, [entry.effort]))
-    return made
+        p = (
+            entry.stiffness,
+            entry.rest,
+            entry.damping,
+            *(_friction_and_stops(entry) if full else ()),
+        )
+        laws.append(Draft(member, "full" if full else "linear", k, k, p, [entry.effort]))
+    return laws
 
 
-def _full(entry: LawEntry) -> Numbers:
+def _friction_and_stops(entry: LawEntry) -> Numbers:
+    """Parameters of the kernel "full" after those of the kernel "linear"."""
     friction, limits = entry.friction, entry.limits
     return (
         friction.coulomb, friction.static, friction.stribeck_velocity,
         friction.regularisation_velocity,
-        -_FAR if limits.lower is None or not limits.yields else limits.lower,
-        _FAR if limits.upper is None or not limits.yields else limits.upper,
+        -_UNREACHABLE if limits.lower is None or not limits.yields else limits.lower,
+        _UNREACHABLE if limits.upper is None or not limits.yields else limits.upper,
         limits.stiffness, limits.damping,
     )  # fmt: skip
 
 
-def _is_known(hinge: Hinge) -> bool:
-    """Whether the law's kernels know where its rotation stands in q and u."""
+def _is_built_in(hinge: Hinge) -> bool:
+    """Whether the law kernels know the indices of the hinge's rotation in q and u."""
     return hinge.facts is not None and hinge.facts.runs_as in builtin_hinges()
 
 
-def _rotational(hinge: Hinge, slots: HingeSlots, member: int) -> list[Draft]:
-    """Law of a hinge with a quaternion: springs from a potential, dampers, efforts; friction."""
+def _rotational_laws(hinge: Hinge, slots: HingeSlots, member: int) -> list[Draft]:
+    """Laws of a hinge with a quaternion: springs from a potential, dampers, efforts; friction."""
     entries = [hinge.law.entry(k) for k in range(slots.nu)]
-    made = []
+    laws = []
     if any(_acts(entry) for entry in entries):
         translations, rotations = entries[:-3], entries[-3:]
         p = [getattr(e, key) for key in ("stiffness", "rest", "damping") for e in translations]
         p += [e.stiffness for e in rotations] + [0.0] + [e.damping for e in rotations]
         axes = tuple(x for row in twist_axes(hinge) for x in row)
         kernel, efforts = "six" if translations else "rotation", [e.effort for e in entries]
-        made.append(Draft(member, kernel, 0, 0, tuple(p), efforts, axes))
+        laws.append(Draft(member, kernel, 0, 0, tuple(p), efforts, axes))
     for k, entry in enumerate(entries):
         if entry.friction.acts:
-            numbers = (0.0, 0.0, 0.0, *_full(entry))
-            made.append(Draft(member, "full", 0, k, numbers, [_NOTHING]))
-    return made
+            numbers = (0.0, 0.0, 0.0, *_friction_and_stops(entry))
+            laws.append(Draft(member, "full", 0, k, numbers, [_ZERO]))
+    return laws

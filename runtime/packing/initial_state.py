@@ -1,4 +1,4 @@
-"""The state in which a scene begins, as its hinges say it."""
+"""Initial state of a scene, as given by its hinges."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 def start_values(
     scene: Scene, layout: Layout, flexible: Mapping[str, ModalBody] | None = None
 ) -> tuple[Array, Array]:
-    """(q, u) of the scene; driven coordinates still as `initial` has them."""
+    """Initial (q, u) of the scene; driven coordinates have the values of `initial`."""
     q, u = np.zeros(layout.nq), np.zeros(layout.nu)
     for group in layout.groups:
         for k, slots in enumerate(group.hinges):
-            one_q, one_u = _values(scene.hinges[group.first + k], slots)
+            hinge_q, hinge_u = _hinge_values(scene.hinges[group.first + k], slots)
             if group.count == 1:
-                q[slots.q_slice], u[slots.u_slice] = one_q, one_u
+                q[slots.q_slice], u[slots.u_slice] = hinge_q, hinge_u
                 continue
             for target, first, values in (
-                (q, group.q_places(), one_q), (u, group.u_places(), one_u)
+                (q, group.q_places(), hinge_q), (u, group.u_places(), hinge_u)
             ):  # fmt: skip
                 if len(values):
-                    mine = first[k :: len(group.hinges)]
-                    target[mine[:, None] + np.arange(len(values))] = values
+                    repeats = first[k :: len(group.hinges)]
+                    target[repeats[:, None] + np.arange(len(values))] = values
     for name, body in (flexible or {}).items():
         slots = layout.modal[name]
         if len(body.eta):
@@ -43,8 +43,8 @@ def start_values(
     return q, u
 
 
-def _values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
-    """q and u of one hinge."""
+def _hinge_values(hinge: Hinge, slots: HingeSlots) -> tuple[Array, Array]:
+    """Initial (q, u) of one hinge."""
     q, u = np.zeros(slots.nq), np.zeros(slots.nu)
     q[:] = default_coordinates(slots.nq, slots.quaternion)
     if hinge.initial is not None and hinge.initial.q:

@@ -1,4 +1,4 @@
-"""Scene of nodes -> places of its hinges and flexible bodies in q and u."""
+"""Construction of the layout of q and u from a scene of nodes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Texts = tuple[str, ...]
 def build_layout(
     expanded: ExpandedScene, releases: Mapping[str, int], elements: Elements
 ) -> Layout:
-    """Places of all hinges in q and u: the scene's hinges, those of its chains, then the modes."""
+    """Build the layout of q and u: the scene's hinges, those of its chains, then the modes."""
     scene = expanded.scene
     groups: list[Group] = []
     q = u = 0
@@ -51,16 +51,16 @@ def build_layout(
 def _slots(
     hinge: Hinge, releases: Mapping[str, int], elements: Elements, q: int, u: int
 ) -> HingeSlots:
-    running = kernel_type(hinge, releases)
-    elements.get("hinge", running, hinge.name)
-    facts = builtin_hinges()[LETS_GO] if hinge.is_weld and running == LETS_GO else hinge.facts
-    assert facts is not None  # or the element would not be known
+    runs_as = kernel_type(hinge, releases)
+    elements.get("hinge", runs_as, hinge.name)
+    facts = builtin_hinges()[LETS_GO] if hinge.is_weld and runs_as == LETS_GO else hinge.facts
+    assert facts is not None  # `get` has rejected unknown types
     return HingeSlots(
-        hinge.name, hinge.type, q, u, *_texts(facts.coordinates), *_texts(facts.speeds),
-        facts.quaternion, facts.straight, facts.steady, facts.steady and not facts.slides,
+        hinge.name, hinge.type, q, u, *_names_and_units(facts.coordinates),
+        *_names_and_units(facts.speeds), facts.quaternion, facts.straight, facts.steady,
+        facts.steady and not facts.slides,
     )  # fmt: skip
 
 
-def _texts(entries: Sequence[Param]) -> tuple[Texts, Texts]:
-    """Names and units."""
+def _names_and_units(entries: Sequence[Param]) -> tuple[Texts, Texts]:
     return tuple(entry.name for entry in entries), tuple(entry.unit for entry in entries)

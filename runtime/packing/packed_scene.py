@@ -1,4 +1,4 @@
-"""A scene as the arrays of the looped engine."""
+"""Scene as records of the looped engine."""
 
 from __future__ import annotations
 
@@ -17,19 +17,22 @@ from .scene_frames import Frames
 from .switch_margins import Watched, event_order
 from .system import System
 
-#: Spans of time whose maps are kept.
-_MAPS = 8
+#: Largest number of cached time maps.
+_MAX_TIME_MAPS = 8
 
 
 @dataclass
 class PackedScene(Frames):
-    """A scene in internal frames, in Python and in the engine's arrays.
+    """Scene in internal frames, in Python and as records of the engine.
 
-    `scratch` is the first number of the workspace behind what the bodies need, `tape_slots` the
-    largest workspace of a tape, `workspace` the whole length; `qr` is whether the sweep is that of
-    least squares, `refined` whether accelerations of a tree are refined.
-    `held` are the inputs that are set during a run, by name.  `behind` says, where it is known,
-    what is behind closed loops that cannot go on, and what to do.
+    Attributes:
+        scratch: index in the workspace behind the numbers of the bodies.
+        tape_slots: largest workspace of a tape.
+        workspace: length of the workspace.
+        qr: whether accelerations come from the QR sweep.
+        refined: whether accelerations of a tree are refined.
+        held: names of the inputs that are set during a run.
+        behind: gives the cause and remedy of loops that cannot move on, "" if unknown.
     """
 
     system: System
@@ -50,29 +53,29 @@ class PackedScene(Frames):
 
     @property
     def channels(self) -> dict[str, PiecewisePolynomial]:
-        """Inputs and signals over time by their names, as this system has them."""
+        """Input or signal name -> its values over time."""
         return dict(zip(self.layout.inputs, self.system.inputs, strict=True))
 
     @property
     def floors(self) -> list[float]:
-        """Up to where pivots of the rows of closed loops are rounding."""
+        """Pivots (rows,) of the constraint rows below which they count as rounding."""
         return [] if self.written.loops is None else self.written.loops.floors
 
     def time_map(self, start: float, end: float) -> TimeMap:
-        """Where the steps of a run from `start` to `end` (s) end, and how long they may be."""
+        """Times at which steps from `start` to `end` (s) must end, and limits of their length."""
         span = (start, end)
         if span not in self._time_maps:
-            if len(self._time_maps) >= _MAPS:
+            if len(self._time_maps) >= _MAX_TIME_MAPS:
                 self._time_maps.clear()
-            inputs, samples = self.channels, [one.sample_time for one in self.scene.controller]
-            found = time_map(
+            inputs = self.channels
+            samples = [controller.sample_time for controller in self.scene.controller]
+            self._time_maps[span] = time_map(
                 active_expressions(self.scene, self.held, inputs), start, end, inputs, samples
             )
-            self._time_maps[span] = found
         return self._time_maps[span]
 
     def slopes(self) -> Slopes:
-        """Derivatives of the scene's expressions, in the records from now on."""
+        """Derivative tapes of the scene's expressions; the first call adds them to the records."""
         with LOCK:
             if self._slopes is None:
                 self._slopes = write_slopes(self.system, self.model, self.ffi)
@@ -80,20 +83,20 @@ class PackedScene(Frames):
 
     @cached_property
     def watched(self) -> Watched:
-        """Events, releases and switches as one tape."""
+        """Tape of the event functions: events, releases and switches."""
         return event_order(self.scene, self.layout, self.held)
 
     @cached_property
     def goes_by_time(self) -> bool:
-        """Whether steps of a run may have to end, or to be short, somewhere known before."""
+        """Whether times of step ends or step limits may be known before a run."""
         return bool(self.scene.controller) or any(
-            one.inputs or one.drive or "t" in {name.text for name in one.expression.names}
-            for one in active_expressions(self.scene, self.held)
+            active.inputs or active.drive or "t" in {name.text for name in active.expression.names}
+            for active in active_expressions(self.scene, self.held)
         )
 
 
 def resize_workspace(packed: PackedScene, slots: int) -> None:
-    """Room for tapes of `slots` numbers behind the blocks."""
+    """Resize the workspace for tapes of `slots` numbers behind the blocks of the bodies."""
     system, model = packed.system, packed.model
     packed.tape_slots = max(packed.tape_slots, slots)
     state = 2 * (system.nq + system.nu) + system.n_values + 3 * len(system.driven)
@@ -104,8 +107,10 @@ def resize_workspace(packed: PackedScene, slots: int) -> None:
 
 
 def enable_refinement(packed: PackedScene, times: int) -> None:
-    """Let the packed tree refine its accelerations so often, by an answer behind the blocks, before
-    it is resized; closed loops have room for theirs, and say themselves how often."""
+    """Refine the accelerations of a tree `times` times; call it before `resize_workspace`.
+
+    Closed loops have their own workspace and number of refinements.
+    """
     if packed.system.closes:
         return
     if not packed.refined:

@@ -125,4 +125,4 @@ def test_the_command_line_tells_of_turns(tmp_path: Path) -> None:
     file.write_text(arm(1.57079632679).to_toml())
     asked = ["simulate", str(file), "--t-end", "0.01", "--output", str(tmp_path / "arm.csv")]
     done = CliRunner().invoke(app, asked)
-    assert "4 orientations within a tolerance of quarter turns taken as these" in done.output
+    assert "4 orientations within a tolerance of right angles replaced by these" in done.output

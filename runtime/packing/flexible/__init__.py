@@ -1,1 +1,1 @@
-"""Flexible bodies become nodes, or rigid bodies, of the scene that the sweep visits."""
+"""Expansion of flexible bodies into nodes of the tree, or their replacement by rigid bodies."""

@@ -1,9 +1,8 @@
-"""The user's scene with flexible bodies -> the scene of nodes that the sweep visits.
+"""Expansion of flexible bodies: from the user's scene to the scene of nodes.
 
-A flexible body "blade" becomes a frame node "blade" (its floating frame, with the modes as internal
-coordinates), a node per end, and, where the frame is not that of the section by which the body is
-held, a massless node at that section.  All are rigid bodies behind fixed hinges to what follows;
-which connections pass sections of flexible bodies is kept beside the scene.
+A flexible body "blade" becomes a frame node "blade" (its floating frame, with the modes) and a node
+per end.  If its inboard section moves relative to the frame, that section gets a massless node.
+All nodes are rigid bodies on fixed hinges; `ExpandedScene` lists which connections pass a section.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ HELD, POINT = "held", "point"
 
 @dataclass(frozen=True)
 class Passage:
-    """A connection that passes a section of the flexible body `body`, to its frame or from it."""
+    """Connection through a section of the flexible body `body`, inward to its frame or outward."""
 
     body: str
     port: ModalPort
@@ -37,8 +36,19 @@ class Passage:
 
 @dataclass
 class ExpandedScene:
-    """The scene of nodes; `nodes` are ends ("blade.tip") by the names of their nodes, `passages`
-    the sections passed, `idle` the nodes that nothing hangs on or acts on."""
+    """Scene of nodes.
+
+    Attributes:
+        scene: of nodes.
+        described: as the user wrote it.
+        bodies: flexible bodies.
+        nodes: end ("blade.tip") -> name of its node.
+        passages: node -> section that its connection passes.
+        idle: nodes without hinges, loads and force elements on them.
+        held: flexible body -> its end on the inboard hinge.
+        rigidified: substitution of bodies that are rigid in the run; None without any.
+        cuts: cut hinges and constraints that close loops.
+    """
 
     scene: Scene
     described: Scene
@@ -46,25 +56,21 @@ class ExpandedScene:
     nodes: dict[str, str] = field(default_factory=dict)
     passages: dict[str, Passage] = field(default_factory=dict)
     idle: set[str] = field(default_factory=set)
-    #: End by which each flexible body is held.
     held: dict[str, str] = field(default_factory=dict)
-    #: What became of the bodies that are rigid in the run, None where there is none.
     rigidified: RigidSubstitution | None = None
-    #: What closes loops.
     cuts: tuple[Cut, ...] = ()
 
     def is_node(self, name: str) -> bool:
-        """Whether a body of the scene of nodes belongs to a flexible body."""
+        """Whether a body of the expanded scene belongs to a flexible body."""
         return name in self.bodies or name in self.passages or name.endswith(f"/{HELD}")
 
 
 def expand(
     scene: Scene, bodies: Mapping[str, ModalBody], cuts: tuple[Cut, ...] = ()
 ) -> ExpandedScene:
-    """The scene of nodes of a scene and its flexible bodies; `cuts` are the hinges that close loops
-    in it.
+    """Expand flexible bodies into nodes; `cuts` close the loops of the scene.
 
-    Raises SceneError for a flexible body that no hinge holds.
+    Raises SceneError for a flexible body without an inboard hinge.
     """
     if not bodies:
         return ExpandedScene(scene, scene, bodies, cuts=cuts)
@@ -72,21 +78,22 @@ def expand(
 
 
 class _Expansion:
-    """One walk over the flexible bodies; tables of the new scene grow as it goes."""
+    """Builder of the expanded scene."""
 
     def __init__(
         self, scene: Scene, bodies: Mapping[str, ModalBody], cuts: tuple[Cut, ...]
     ) -> None:
-        self.scene, self.made, self.cuts = scene, ExpandedScene(scene, scene, bodies), cuts
+        self.scene, self.cuts = scene, cuts
+        self.expanded = ExpandedScene(scene, scene, bodies)
         self.body = list(scene.body)
         self.internal: list[Hinge] = []
-        self.used = {self._full(x) for x in self._references()}
+        self.used = {self._full_reference(reference) for reference in self._references()}
 
     def run(self) -> ExpandedScene:
-        self.made.held = self._held()
+        self.expanded.held = self._inboard_ends()
         hinges = list(self.scene.hinge)
-        for name, body in self.made.bodies.items():
-            hinges = self._flexible(name, body, hinges)
+        for name, body in self.expanded.bodies.items():
+            hinges = self._add_flexible_body(name, body, hinges)
         inboard = [self._node(hinge.inboard) for hinge in hinges]
         hinges = [
             hinge if name == hinge.inboard else hinge.model_copy(update={"inboard": name})
@@ -99,15 +106,16 @@ class _Expansion:
         fields = {name: getattr(self.scene, name) for name in type(self.scene).model_fields}
         fields |= {
             "body": tuple(self.body), "hinge": (*hinges, *self.internal), "chain": tuple(chains),
-            "load": tuple(map(self._load, self.scene.load)),
+            "load": tuple(map(self._point_load, self.scene.load)),
         }  # fmt: skip
-        self.made.scene = Scene.model_construct(**fields)
-        self.made.cuts = tuple(replace(cut, body=self._node(cut.body)) for cut in self.cuts)
-        return self.made
+        self.expanded.scene = Scene.model_construct(**fields)
+        self.expanded.cuts = tuple(replace(cut, body=self._node(cut.body)) for cut in self.cuts)
+        return self.expanded
 
     # --- references ---------------------------------------------------------------------------
 
     def _references(self) -> Iterator[str]:
+        """Bodies and ends on which hinges, loads, force elements and constraints are."""
         for cut in self.cuts:
             yield cut.body if cut.constraint is None else cut.constraint.to
         yield from (hinge.inboard for hinge in self.scene.hinge)
@@ -116,87 +124,90 @@ class _Expansion:
         for element in (*self.scene.forces, *self.scene.constraint):
             yield from (element.from_, element.to)
 
-    def _full(self, reference: str) -> str:
-        """The end that a reference means: the bare name of a beam is its root."""
+    def _full_reference(self, reference: str) -> str:
+        """Reference with the end in it: the bare name of a beam means its root."""
         name, end = split_reference(reference)
-        if name not in self.made.bodies or end:
+        if name not in self.expanded.bodies or end:
             return reference
         return f"{name}.root"
 
     def _node(self, reference: str) -> str:
-        return self.made.nodes.get(self._full(reference), reference)
+        return self.expanded.nodes.get(self._full_reference(reference), reference)
 
-    def _held(self) -> dict[str, str]:
-        """End by which each flexible body is held."""
-        ends = (split_reference(self._full(hinge.outboard)) for hinge in self.scene.hinge)
-        return {name: end for name, end in ends if name in self.made.bodies}
+    def _inboard_ends(self) -> dict[str, str]:
+        """Flexible body -> its end on the inboard hinge."""
+        ends = (split_reference(self._full_reference(h.outboard)) for h in self.scene.hinge)
+        return {name: end for name, end in ends if name in self.expanded.bodies}
 
-    def _load(self, load: Load) -> Load:
-        """A distributed load acts on the node of its weighted mean section."""
+    def _point_load(self, load: Load) -> Load:
+        """The load on a node; a distributed one acts on the node of its weighted mean section."""
         name = split_reference(load.on)[0]
-        if name not in self.made.bodies:
+        if name not in self.expanded.bodies:
             return load
         if load.force_per_length is None:
-            axes = self._full(load.on) if load.axes == "body" else load.axes
-            return load.model_copy(update={"on": self._full(load.on), "axes": axes})
-        length = self._span(load)
-        force = tuple(_times(entry, length) for entry in load.force_per_length)
+            on = self._full_reference(load.on)
+            axes = on if load.axes == "body" else load.axes
+            return load.model_copy(update={"on": on, "axes": axes})
+        length = self._span_length(load)
+        force = tuple(_scaled(entry, length) for entry in load.force_per_length)
         axes = name if load.axes == "body" else load.axes
         return load.model_copy(update={"on": f"{name}.{load.name}", "force": force, "axes": axes})
 
-    def _span(self, load: Load) -> float:
+    def _span_length(self, load: Load) -> float:
+        """Length of the loaded part of a beam, m."""
         beam = next(b for b in self.scene.beam if b.name == split_reference(load.on)[0])
         first, last = load.span or (0.0, beam.length)
         return float(last - first)
 
     # --- nodes --------------------------------------------------------------------------------
 
-    def _flexible(self, name: str, body: ModalBody, hinges: list[Hinge]) -> list[Hinge]:
-        held = self.made.held.get(name)
-        if held is None:
+    def _add_flexible_body(self, name: str, body: ModalBody, hinges: list[Hinge]) -> list[Hinge]:
+        """Add the nodes of a flexible body; returns `hinges` with its inboard hinge on them."""
+        inboard_end = self.expanded.held.get(name)
+        if inboard_end is None:
             raise SceneError(
-                f'scene: "{name}" is held by no hinge; add one with outboard = "{name}"'
+                f'scene: "{name}" has no inboard hinge; add one with outboard = "{name}"'
             )
-        port = body.ports[held]
+        port = body.ports[inboard_end]
         moves = port.moves
         frame = Body(name="frame", mass=0.0)
         if moves:
             node = f"{name}/{HELD}"
             self.body.append(frame.model_copy(update={"name": node}))
-            self._hinge(f"{name}/frame", node, name)
-            self.made.passages[name] = Passage(name, port, inward=True)
-            self.made.nodes[f"{name}.{held}"] = node
+            self._add_weld(f"{name}/frame", node, name)
+            self.expanded.passages[name] = Passage(name, port, inward=True)
+            self.expanded.nodes[f"{name}.{inboard_end}"] = node
             target = node
         else:
-            turned = to_matrix([[float(x) for x in row] for row in port.rotation])
+            rotation = to_matrix([[float(x) for x in row] for row in port.rotation])
             x, y, z = (float(entry) for entry in port.position)
-            end = End(position=(x, y, z), orientation=to_quaternion(turned))
-            frame = frame.model_copy(update={"ends": {held: end}})
-            target = f"{name}.{held}"
+            end = End(position=(x, y, z), orientation=to_quaternion(rotation))
+            frame = frame.model_copy(update={"ends": {inboard_end: end}})
+            target = f"{name}.{inboard_end}"
         self.body.append(frame.model_copy(update={"name": name}))
-        for end_name, one in body.ports.items():
-            if end_name != held or not moves:
-                self._end(name, end_name, one)
+        for end_name, end_port in body.ports.items():
+            if end_name != inboard_end or not moves:
+                self._add_end(name, end_name, end_port)
         for k, point in enumerate(body.points):
-            self._point(name, k, point)
+            self._add_mass_point(name, k, point)
         return [
             hinge.model_copy(update={"outboard": target}) if hinge.outboard_body == name else hinge
             for hinge in hinges
         ]
 
-    def _end(self, name: str, end: str, port: ModalPort) -> None:
+    def _add_end(self, name: str, end: str, port: ModalPort) -> None:
         node = f"{name}/{end}"
         self.body.append(Body(name="end", mass=0.0).model_copy(update={"name": node}))
-        self._hinge(node, name, node)
-        self.made.passages[node] = Passage(name, port, inward=False)
-        self.made.nodes[f"{name}.{end}"] = node
+        self._add_weld(node, name, node)
+        self.expanded.passages[node] = Passage(name, port, inward=False)
+        self.expanded.nodes[f"{name}.{end}"] = node
         loaded = any(
             load.name == end and split_reference(load.on)[0] == name for load in self.scene.load
         )
         if f"{name}.{end}" not in self.used and not loaded:
-            self.made.idle.add(node)
+            self.expanded.idle.add(node)
 
-    def _point(self, name: str, k: int, point: MassPoint) -> None:
+    def _add_mass_point(self, name: str, k: int, point: MassPoint) -> None:
         node = f"{name}/{POINT} {k + 1}"
         j = point.inertia
         entries = (j[0, 0], j[1, 1], j[2, 2], j[0, 1], j[0, 2], j[1, 2])
@@ -205,21 +216,19 @@ class _Expansion:
             allow_unphysical_inertia=True,
         )  # fmt: skip
         self.body.append(body.model_copy(update={"name": node}))
-        self._hinge(node, name, node)
-        self.made.passages[node] = Passage(name, point.port, inward=False)
+        self._add_weld(node, name, node)
+        self.expanded.passages[node] = Passage(name, point.port, inward=False)
 
-    def _hinge(self, name: str, inboard: str, outboard: str) -> None:
+    def _add_weld(self, name: str, inboard: str, outboard: str) -> None:
         weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="frame")
         update = {"name": name, "inboard": inboard, "outboard": outboard}
         self.internal.append(weld.model_copy(update=update))
 
 
-def _times(entry: Expression, length: float) -> Expression:
-    return (
-        entry
-        if entry.is_zero
-        else parse(f"{length!r} * ({entry.text})", constants=dict(entry.constants))
-    )
+def _scaled(entry: Expression, factor: float) -> Expression:
+    if entry.is_zero:
+        return entry
+    return parse(f"{factor!r} * ({entry.text})", constants=dict(entry.constants))
 
 
 __all__ = ["ExpandedScene", "Passage", "expand"]

@@ -1,4 +1,4 @@
-"""Which rotations of a section its hinge holds."""
+"""Rotations of a section that its hinge constrains."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 def constrained_rotations(hinge: Hinge, rotation: Array, unknown: Array) -> Array:
-    """(3, 3) projection of rotations on those that a hinge holds; `rotation` are the axes of its
-    outboard end in those of the body, `unknown` stands for hinges with axes that turn.
+    """Projection (3, 3) of rotations onto those that a hinge constrains, in body axes.
 
-    A drive holds what it moves.
+    `rotation` are the axes of its outboard end in those of the body.  `unknown` is returned for
+    hinges whose free axes rotate.  Driven coordinates are constrained.
     """
     motions, facts = initial_motion_axes(hinge), hinge.facts
     if facts is None or motions is None:

@@ -1,10 +1,9 @@
-"""Bodies that respond one way in closed loops: where loops pass them, and that they do not move
-there.
+"""One-way coupled flexible bodies in closed loops: their shapes must keep the loops closed.
 
-The run closes loops with these bodies rigid.  A response on top of it leaves them closed where the
-sections that a loop passes stay in the floating frame, but for turns that its hinges let go: beams
-between pins, with the shapes of simply supported ones.  Loads of loops do no work on such shapes
-then, those that rigid bodies do not determine among them.
+The run closes the loops with these bodies rigid.  The elastic response added afterwards keeps them
+closed if the sections in a loop do not move in the floating frame, except for rotations that its
+hinges leave free: beams between pins with simply supported shapes.  Constraint loads then do no
+work on the shapes, including those that rigid bodies do not determine.
 """
 
 from __future__ import annotations
@@ -24,49 +23,50 @@ from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import ModalPort
 from .held_rotations import constrained_rotations
 
-#: What a section moves by in parts of the size of the shape that is rounding.
+#: Largest motion of a section, relative to the size of the shape, that counts as rounding.
 _ROUNDING = 1e-6
 
 
 def loop_elements(scene: Scene, plan: ClosurePlan) -> tuple[Hinge | Constraint, ...]:
-    """The hinges around all loops, cut or not, and the constraints."""
+    """Hinges of all loops, cut or not, followed by the constraints."""
     mechanism, paths = plan.mechanism, Paths(plan.mechanism, plan.tree)
     first = len(plan.cut_of)
-    closing = [
+    row_groups = [
         *(mechanism.groups[cut] for cut in plan.cut_of),
         *plan.groups[first : first + len(scene.constraint)],
     ]
-    passed = {plan.tree[body] for group in closing for body, _ in paths.crossed(group)}
+    crossed = {plan.tree[body] for group in row_groups for body, _ in paths.crossed(group)}
     hinges = scene.skeleton.hinges
-    return (*(hinges[number] for number in sorted(passed.union(plan.cut_of))), *scene.constraint)
+    return (*(hinges[number] for number in sorted(crossed.union(plan.cut_of))), *scene.constraint)
 
 
 def check_loop_ends(
     bodies: Mapping[str, ModalBody], elements: tuple[Hinge | Constraint, ...]
 ) -> None:
-    """SceneError for a shape of one of the bodies that moves a section which a loop passes."""
+    """Raise SceneError if a shape of one of the bodies moves a section that is in a loop."""
     for name, body in bodies.items():
         for element, end, inboard in ends_on_body(name, elements):
             port = body.ports[end]
-            shift, turn = _moved(body, port, _held(element, port, inboard))
-            moving = shift + turn > _ROUNDING
+            projection = _constrained_projection(element, port, inboard)
+            shift, rotation = _section_motion(body, port, projection)
+            moving = shift + rotation > _ROUNDING
             if not moving.any():
                 continue
             table = "constraint" if isinstance(element, Constraint) else "hinge"
             first = int(moving.argmax())
-            does = "moves" if shift[first] > _ROUNDING else "turns"
+            motion = "moves" if shift[first] > _ROUNDING else "rotates"
             raise SceneError(
-                f'"{name}": model: shape {body.modes[first]} {does} the end "{end}", where {table} '
-                f'"{element.name}" closes a loop, and a body that responds one way does not close '
-                'it again; on a beam between pins take basis = "simply-supported" and frame = '
-                '"chord", or else model = "flexible"'
+                f'"{name}": model: shape {body.modes[first]} {motion} the end "{end}", where '
+                f'{table} "{element.name}" closes a loop that one-way coupling would open; for a '
+                'beam between pins use basis = "simply-supported" and frame = "chord", otherwise '
+                'model = "flexible"'
             )
 
 
 def ends_on_body(
     name: str, elements: tuple[Hinge | Constraint, ...]
 ) -> Iterator[tuple[Hinge | Constraint, str, bool]]:
-    """(element, end of the body on it, whether it is the inboard one)."""
+    """Ends of a body on the elements: (element, end, whether it is the element's inboard one)."""
     for element in elements:
         pair = (
             (element.from_, element.to) if isinstance(element, Constraint)
@@ -78,19 +78,19 @@ def ends_on_body(
                 yield element, end, inboard
 
 
-def _held(element: Hinge | Constraint, port: ModalPort, inboard: bool) -> Array:
-    """(3, 3) projection on the turns of a section that an element holds."""
+def _constrained_projection(element: Hinge | Constraint, port: ModalPort, inboard: bool) -> Array:
+    """Projection (3, 3) onto the rotations of a section that an element constrains."""
     if isinstance(element, Constraint):
         return np.eye(3) * (element.type == ROLLING)
     axes = port.rotation @ np.array(element.rotation) if inboard else port.rotation
     return constrained_rotations(element, axes, unknown=np.eye(3))
 
 
-def _moved(body: ModalBody, port: ModalPort, held: Array) -> tuple[Array, Array]:
-    """(modes,) twice: how far each shape shifts a section, and turns it by what is held, in parts
-    of its own size."""
+def _section_motion(body: ModalBody, port: ModalPort, projection: Array) -> tuple[Array, Array]:
+    """Displacement and constrained rotation (modes,) of a section, relative to the shapes' size."""
     size = np.sqrt(np.diag(body.Mff) / body.mass)
-    places = np.array([one.position for one in body.ports.values()])
-    length = float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0
-    shift, turn = np.abs(port.phi).max(axis=0), np.abs(held @ port.theta).max(axis=0)
-    return shift / size, length * turn / size
+    positions = np.array([port.position for port in body.ports.values()])
+    length = float(np.linalg.norm(np.ptp(positions, axis=0))) or 1.0
+    shift = np.abs(port.phi).max(axis=0)
+    rotation = np.abs(projection @ port.theta).max(axis=0)
+    return shift / size, length * rotation / size

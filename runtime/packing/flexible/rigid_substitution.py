@@ -1,10 +1,9 @@
-"""Flexible bodies made rigid: the level of model below the coupled one, and the first step of
-linear elastodynamics.
+"""Substitution of rigid bodies for flexible ones whose model is "rigid" or "one-way".
 
-A body whose `model` is "rigid" or "one-way" becomes a rigid body with the mass, mass centre,
-inertia and ends of the undeformed one.  Of a one-way body every end on which something acts becomes
-a massless body welded to it, "blade/tip": the load of that weld is all that acts there.  Which
-hinges close loops is decided before that, for what holds a body would be a choice again.
+The rigid body has the mass, mass centre, inertia and ends of the undeformed one.  Every loaded end
+of a one-way body becomes a massless body welded to it, "blade/tip", so that the load of the weld is
+the total load there.  The cut hinges are chosen before the substitution, because the spanning tree
+of the new scene might differ.
 """
 
 from __future__ import annotations
@@ -37,21 +36,22 @@ if TYPE_CHECKING:
 
 Joining = TypeVar("Joining", Spring, Bushing, Constraint)
 
-#: What `compile(flexibility=)` takes, and the `model` it gives every flexible body.
+#: Values of `compile(flexibility=)`, and the `model` that they give every flexible body.
 LEVELS = {"coupled": "flexible", "one-way": "one-way", "rigid": "rigid"}
 
 
 @dataclass
 class RigidSubstitution:
-    """A scene whose flexible bodies are all coupled ones.
+    """Scene in which rigid bodies stand for the flexible ones that are not coupled.
 
     Attributes:
-        nodes: "blade.tip" -> the body welded there, "blade/tip".
-        one_way: the modal bodies of those that respond one way.
-        held: the end by which each of them is held.
-        holders: the hinge of the tree that holds each of them.
-        looped: names of the hinges around closed loops.
-        passed: those of them that a loop passes.
+        scene: after the substitution.
+        nodes: end ("blade.tip") -> body welded there ("blade/tip").
+        one_way: one-way coupled body -> its modal body.
+        held: one-way coupled body -> its end on the inboard hinge.
+        holders: one-way coupled body -> its inboard hinge.
+        looped: names of the hinges in closed loops.
+        passed: one-way coupled bodies in a closed loop.
     """
 
     scene: Scene
@@ -64,15 +64,15 @@ class RigidSubstitution:
 
 
 def with_level(scene: Scene, flexibility: str | None) -> Scene:
-    """The scene with one level of model for all flexible bodies; None leaves it as it is.
+    """Set the model level of all flexible bodies; None keeps the scene.
 
-    SceneError for a level that does not exist.
+    Raises SceneError for an unknown level.
     """
     if flexibility is None:
         return scene
     known = ", ".join(LEVELS)
     if require_word("flexibility", flexibility, f"one of {known}, or None") not in LEVELS:
-        raise SceneError(f'flexibility "{flexibility}" is not known; there are: {known}')
+        raise SceneError(f'flexibility: expected one of {known}, found "{flexibility}"')
     level = {"model": LEVELS[flexibility]}
     fields = {key: getattr(scene, key) for key in type(scene).model_fields}
     fields["beam"] = tuple(beam.model_copy(update=level) for beam in scene.beam)
@@ -83,115 +83,113 @@ def with_level(scene: Scene, flexibility: str | None) -> Scene:
 def substitute_rigid_bodies(
     scene: Scene, known: Mapping[str, ModalBody], only: Collection[str] | None = None
 ) -> RigidSubstitution:
-    """The scene with rigid bodies in place of those whose model is "rigid" or "one-way"; of `only`
-    these names where they are given.
+    """Substitute rigid bodies for those whose model is "rigid" or "one-way".
 
-    `known` are the modal bodies that need not be computed.
-
-    SceneError for a viscous drag, which rigid bodies do not have, and for shapes of a one-way body
-    that open a loop.
+    `only` restricts this to some names; `known` are modal bodies computed before.
+    Raises SceneError for viscous drag, which rigid bodies do not have, and for shapes of a one-way
+    body that open a loop.
     """
-    stiff: list[Beam | Elastic] = [b for b in scene.beam if b.model != "flexible"]
-    stiff += [b for b in scene.elastic if b.model != "flexible"]
-    stiff = [b for b in stiff if only is None or b.name in only]
-    return _Rigidifying(scene, stiff, known).run() if stiff else RigidSubstitution(scene)
+    bodies: list[Beam | Elastic] = [b for b in scene.beam if b.model != "flexible"]
+    bodies += [b for b in scene.elastic if b.model != "flexible"]
+    bodies = [b for b in bodies if only is None or b.name in only]
+    return _Substitution(scene, bodies, known).run() if bodies else RigidSubstitution(scene)
 
 
-class _Rigidifying:
-    """One walk over the bodies to be made rigid."""
+class _Substitution:
+    """Builder of the scene with rigid bodies."""
 
     def __init__(
-        self, scene: Scene, stiff: list[Beam | Elastic], known: Mapping[str, ModalBody]
+        self, scene: Scene, substituted: list[Beam | Elastic], known: Mapping[str, ModalBody]
     ) -> None:
-        self.scene, self.stiff = scene, {body.name: body for body in stiff}
+        self.scene, self.substituted = scene, {body.name: body for body in substituted}
         self.known = known
-        self.made = RigidSubstitution(scene)
-        responds = any(body.model == "one-way" for body in stiff)
-        self.held = inboard_hinges_by_body(scene) if responds else {}
+        self.result = RigidSubstitution(scene)
+        has_one_way = any(body.model == "one-way" for body in substituted)
+        self.inboard_hinges = inboard_hinges_by_body(scene) if has_one_way else {}
         self.cut = None
-        if responds and may_have_loops(scene):
-            held = {hinge.name for hinge in self.held.values()}
-            self.cut = frozenset(hinge.name for hinge in scene.hinge) - held
+        if has_one_way and may_have_loops(scene):
+            tree_hinges = {hinge.name for hinge in self.inboard_hinges.values()}
+            self.cut = frozenset(hinge.name for hinge in scene.hinge) - tree_hinges
         self.bodies: dict[str, Body] = {}
         self.welds: list[Hinge] = []
 
     def run(self) -> RigidSubstitution:
-        for name, body in self.stiff.items():
-            self._body(name, body)
-        self._closed()
-        scene, names = self.scene, self.stiff
+        for name, body in self.substituted.items():
+            self._add_body(name, body)
+        self._find_loops()
+        scene, names = self.scene, self.substituted
         fields = {key: getattr(scene, key) for key in type(scene).model_fields}
         fields |= {
             "beam": tuple(beam for beam in scene.beam if beam.name not in names),
             "elastic": tuple(body for body in scene.elastic if body.name not in names),
             "body": (*scene.body, *self.bodies.values()),
-            "hinge": (*map(self._hinge, scene.hinge), *self.welds),
+            "hinge": (*map(self._changed_hinge, scene.hinge), *self.welds),
             "chain": tuple(
                 chain.model_copy(update={"inboard": self._node(chain.inboard)})
                 for chain in scene.chain
             ),
-            "load": tuple(map(self._load, scene.load)),
-            "spring": tuple(map(self._between, scene.spring)),
-            "bushing": tuple(map(self._between, scene.bushing)),
-            "constraint": tuple(map(self._between, scene.constraint)),
+            "load": tuple(map(self._changed_load, scene.load)),
+            "spring": tuple(map(self._with_node_ends, scene.spring)),
+            "bushing": tuple(map(self._with_node_ends, scene.bushing)),
+            "constraint": tuple(map(self._with_node_ends, scene.constraint)),
         }  # fmt: skip
-        self.made.scene = Scene.model_construct(**fields)
-        return self.made
+        self.result.scene = Scene.model_construct(**fields)
+        return self.result
 
-    def _body(self, name: str, body: Beam | Elastic) -> None:
+    def _add_body(self, name: str, body: Beam | Elastic) -> None:
         modal = None
         if body.model == "one-way":
-            modal = self.known.get(name) or _modal(self.scene, body)
-        rigid = _rigid(body, modal)
+            modal = self.known.get(name) or _modal_body(self.scene, body)
+        rigid = _equivalent_rigid_body(body, modal)
         ends = dict(rigid.ends)
-        for load in self._spread(name):
+        for load in self._distributed_loads(name):
             ends[load.name] = End(position=(_middle(load, self._length(name)), 0.0, 0.0))
         self.bodies[name] = rigid.model_copy(update={"ends": ends})
         if modal is None:
             return
-        self.made.one_way[name] = modal
-        holder = self.held.get(name)
-        self.made.held[name] = next(iter(ends)) if holder is None else holder.outboard_end
-        if holder is not None:
-            self.made.holders[name] = holder
+        self.result.one_way[name] = modal
+        hinge = self.inboard_hinges.get(name)
+        self.result.held[name] = next(iter(ends)) if hinge is None else hinge.outboard_end
+        if hinge is not None:
+            self.result.holders[name] = hinge
         used = dict.fromkeys(split_reference(reference)[1] for reference in self._references(name))
-        for end in (*used, *(load.name for load in self._spread(name))):
-            self._weld(name, end)
+        for end in (*used, *(load.name for load in self._distributed_loads(name))):
+            self._add_welded_end(name, end)
 
-    def _weld(self, name: str, end: str) -> None:
+    def _add_welded_end(self, name: str, end: str) -> None:
         node = f"{name}/{end}"
         massless = Body(name="end", mass=0.0)
         self.bodies[node] = massless.model_copy(update={"name": node})
         weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="end")
         update = {"name": node, "inboard": f"{name}.{end}", "outboard": node}
         self.welds.append(weld.model_copy(update=update))
-        self.made.nodes[f"{name}.{end}"] = node
+        self.result.nodes[f"{name}.{end}"] = node
 
-    def _closed(self) -> None:
-        """What loops pass, where one-way bodies are in the scene."""
+    def _find_loops(self) -> None:
+        """Find the hinges and one-way bodies in closed loops; their shapes must not open these."""
         plan = None if self.cut is None else build_topology(self.scene.skeleton).plan
         if plan is None:
             return
-        elements, bodies = loop_elements(self.scene, plan), self.made.one_way
+        elements, bodies = loop_elements(self.scene, plan), self.result.one_way
         check_loop_ends(bodies, elements)
-        self.made.passed = frozenset(name for name in bodies if any(ends_on_body(name, elements)))
-        self.made.looped = frozenset(
-            one.name for one in elements if not isinstance(one, Constraint)
+        self.result.passed = frozenset(name for name in bodies if any(ends_on_body(name, elements)))
+        self.result.looped = frozenset(
+            element.name for element in elements if not isinstance(element, Constraint)
         )
 
     # --- references -----------------------------------------------------------------------------
 
     def _references(self, name: str) -> Iterator[str]:
-        """Ends of a body on which something acts, but for the hinge that holds it."""
+        """Ends of a body with hinges (except its inboard one), loads or force elements."""
         references = [hinge.inboard for hinge in self.scene.hinge]
         references += [chain.inboard for chain in self.scene.chain]
         references += [load.on for load in self.scene.load if load.force_per_length is None]
-        joined = (*self.scene.forces, *self.scene.constraint)
-        references += [end for one in joined for end in (one.from_, one.to)]
-        references += [one.outboard for one in self.scene.hinge if one.name in (self.cut or ())]
+        elements = (*self.scene.forces, *self.scene.constraint)
+        references += [end for element in elements for end in (element.from_, element.to)]
+        references += [h.outboard for h in self.scene.hinge if h.name in (self.cut or ())]
         yield from (reference for reference in references if split_reference(reference)[0] == name)
 
-    def _spread(self, name: str) -> list[Load]:
+    def _distributed_loads(self, name: str) -> list[Load]:
         return [
             load
             for load in self.scene.load
@@ -202,9 +200,9 @@ class _Rigidifying:
         return float(next(beam.length for beam in self.scene.beam if beam.name == name))
 
     def _node(self, reference: str) -> str:
-        return self.made.nodes.get(reference, reference)
+        return self.result.nodes.get(reference, reference)
 
-    def _hinge(self, hinge: Hinge) -> Hinge:
+    def _changed_hinge(self, hinge: Hinge) -> Hinge:
         update: dict[str, object] = {"inboard": self._node(hinge.inboard)}
         if self.cut is not None:
             cut = hinge.name in self.cut
@@ -212,19 +210,20 @@ class _Rigidifying:
             update |= {"cut": cut, "outboard": outboard}
         return hinge.model_copy(update=update)
 
-    def _between(self, element: Joining) -> Joining:
+    def _with_node_ends(self, element: Joining) -> Joining:
         ends = {"from_": self._node(element.from_), "to": self._node(element.to)}
         return element.model_copy(update=ends)
 
-    def _load(self, load: Load) -> Load:
+    def _changed_load(self, load: Load) -> Load:
+        """The load on a rigid body; a distributed one becomes its resultant force."""
         name = split_reference(load.on)[0]
-        if name not in self.stiff:
+        if name not in self.substituted:
             return load
         update: dict[str, object] = {"axes": name if load.axes == "body" else load.axes}
         if load.force_per_length is None:
             return load.model_copy(update=update | {"on": self._node(load.on)})
         first, last = load.span or (0.0, self._length(name))
-        force = tuple(_times(entry, last - first) for entry in load.force_per_length)
+        force = tuple(_scaled(entry, last - first) for entry in load.force_per_length)
         on = self._node(f"{name}.{load.name}")
         return load.model_copy(
             update=update | {"on": on, "force": force, "force_per_length": None, "span": None}
@@ -236,26 +235,24 @@ def _middle(load: Load, length: float) -> float:
     return (first + last) / 2
 
 
-def _times(entry: Expression, length: float) -> Expression:
-    return (
-        entry
-        if entry.is_zero
-        else parse(f"{length!r} * ({entry.text})", constants=dict(entry.constants))
-    )
+def _scaled(entry: Expression, factor: float) -> Expression:
+    if entry.is_zero:
+        return entry
+    return parse(f"{factor!r} * ({entry.text})", constants=dict(entry.constants))
 
 
-def _modal(scene: Scene, body: Beam | Elastic) -> ModalBody:
+def _modal_body(scene: Scene, body: Beam | Elastic) -> ModalBody:
     from mstmm.scene.tables.beam import Beam
 
     from ...flexible.beam.modal_beams import beam_body
     from ...flexible.elastic.modal_elastic import modal_body
 
-    if isinstance(body, Beam):  # its run has no mass points: the tree carries one rigid body
+    if isinstance(body, Beam):  # no mass points: in the tree it is one rigid body
         return beam_body(scene, body.model_copy(update={"quadrature": False}))
     return modal_body(body, scene)
 
 
-def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
+def _equivalent_rigid_body(body: Beam | Elastic, modal: ModalBody | None) -> Body:
     from mstmm.scene.tables.beam import Beam
 
     from ...flexible.elastic.modal_elastic import rigid_inertia_and_ends
@@ -276,7 +273,7 @@ def _rigid(body: Beam | Elastic, modal: ModalBody | None) -> Body:
 
 
 def _to_matrix(array: Array) -> Matrix:
-    """A rotation matrix as the scene's tables hold it."""
+    """Convert a rotation matrix (3, 3) to nested tuples."""
     (a, b, c), (d, e, f), (g, h, i) = array.tolist()
     return ((a, b, c), (d, e, f), (g, h, i))
 
@@ -284,14 +281,14 @@ def _to_matrix(array: Array) -> Matrix:
 def _rigid_body(
     name: str,
     mass: float,
-    first: Array,
-    turning: Array,
+    first_moments: Array,
+    inertia: Array,
     ports: Mapping[str, ModalPort] | Mapping[str, Port],
 ) -> Body:
-    """A rigid body with first moments and inertia (3, 3) about the origin of its axes."""
-    center = first / mass
-    lever = float(center @ center) * np.eye(3) - np.outer(center, center)
-    j = turning - mass * lever
+    """Rigid body with first moments (3,) and inertia (3, 3) about the origin of its axes."""
+    center = first_moments / mass
+    steiner = float(center @ center) * np.eye(3) - np.outer(center, center)
+    j = inertia - mass * steiner
     ends = {
         end: End(
             position=tuple(map(float, port.position)),

@@ -1,1 +1,1 @@
-"""What acts between two ends without mass: springs, elements of users' types, and bushings."""
+"""Massless force elements between two ends: springs, user-defined types and bushings."""

@@ -1,4 +1,4 @@
-"""Bushings: their ends turned so that the axes of both coincide at rest."""
+"""Numbers of bushings, with end axes that coincide in the unloaded pose."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from ..system import ForceNumbers, Numbers
 
 
 def bushing_numbers(frames: Frames, bushing: Bushing) -> ForceNumbers:
-    """The force element between the place of rest, which `from` carries, and the end `to`."""
-    body, axes, place = _end(frames, bushing, bushing.from_)
-    turned = product(axes, bushing.rotation)
-    rest = _sum(place, rotate(turned, bushing.rest.position))
-    other, own, end = _end(frames, bushing, bushing.to)
-    alike = product(own, transpose(bushing.rest.rotation))
-    ends = ((body, _flat(turned), rest), (other, _flat(alike), end))
+    """Force element between the unloaded pose, fixed to the body of `from`, and the end `to`."""
+    body, axes, position = _end(frames, bushing, bushing.from_)
+    bushing_axes = product(axes, bushing.rotation)
+    rest = _sum(position, rotate(bushing_axes, bushing.rest.position))
+    to_body, to_axes, to_position = _end(frames, bushing, bushing.to)
+    to_axes = product(to_axes, transpose(bushing.rest.rotation))
+    ends = ((body, _flat(bushing_axes), rest), (to_body, _flat(to_axes), to_position))
     return ForceNumbers(("force", bushing.element), ends, bushing.numbers, None)
 
 
 def _end(frames: Frames, bushing: Bushing, reference: str) -> tuple[int, Matrix, Vector]:
+    """Position in the tree, axes and offset (m) of an end."""
     body, (a, b, c, d, e, f, g, h, i), offset = frames.end(reference)
     x, y, z = bushing.position if body < 0 else offset
     return body, to_matrix([[a, b, c], [d, e, f], [g, h, i]]), (x, y, z)

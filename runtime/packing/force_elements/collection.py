@@ -1,4 +1,4 @@
-"""All that acts between two ends, in the order of the scene's `forces`."""
+"""Numbers of all force elements, in the order of the scene's `forces`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,6 @@ from .springs import spring_numbers
 
 
 def force_element_numbers(frames: Frames, nodes: Scene, moving: Moving) -> tuple[ForceNumbers, ...]:
-    """Springs, then bushings, of the scene of nodes."""
+    """Numbers of the springs, then the bushings, of the scene of nodes."""
     springs = (spring_numbers(frames, spring, moving) for spring in nodes.spring)
     return (*springs, *(bushing_numbers(frames, bushing) for bushing in nodes.bushing))

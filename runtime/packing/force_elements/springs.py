@@ -1,4 +1,4 @@
-"""Springs, and force elements of users' own types."""
+"""Numbers of springs and of user-defined force elements."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ..system import ForceNumbers, Numbers
 
 
 def spring_numbers(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbers:
-    """The force element between the ends of a spring, and its given effort."""
+    """Force element between the ends of a spring, with its effort expression if it has one."""
     element = frames.elements.get("force", spring.type, spring.name)
-    one, other = (
+    from_end, to_end = (
         (body, axes, spring.position if body < 0 else offset)
         for body, axes, offset in map(frames.end, (spring.from_, spring.to))
     )
@@ -24,4 +24,4 @@ def spring_numbers(frames: Frames, spring: Spring, moving: Moving) -> ForceNumbe
             effort = effort_kernel(law.effort, frames.layout, moving)
     else:
         p = declared_numbers(element.declared, spring.parameters, f'spring "{spring.name}"')
-    return ForceNumbers(("force", spring.type), (one, other), p, effort)
+    return ForceNumbers(("force", spring.type), (from_end, to_end), p, effort)

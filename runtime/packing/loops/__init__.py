@@ -1,1 +1,1 @@
-"""Closed loops: the tree that is left when hinges are cut, and the plan of their rows."""
+"""Closed loops: the spanning tree after cutting hinges, and the plan of the constraint rows."""

@@ -1,4 +1,4 @@
-"""What closes loops -> its numbers in internal frames."""
+"""Numbers of cut hinges and constraints in internal frames."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ if TYPE_CHECKING:
 
 
 def closure_numbers(frames: Frames, runs: Sequence[BodyRun]) -> Iterator[ClosureNumbers]:
-    """Those of cut hinges, then those of constraints."""
+    """Closures of the cut hinges, then of the constraints."""
     if not frames.expanded.cuts:
         return
-    alone = {run.place: run.alike[0] for run in runs}
+    first_bodies = {run.place: run.alike[0] for run in runs}
     for cut in frames.expanded.cuts:
         place = frames.positions[cut.frame]
         if cut.constraint is None:
-            yield _hinge(frames, cut, place, alone[place])
+            yield _cut_hinge_closure(frames, cut, place, first_bodies[place])
         else:
             yield constraint_closure(cut.constraint, frames, place)
 
 
-def _hinge(frames: Frames, cut: Cut, place: int, frame: BodyNumbers) -> ClosureNumbers:
-    """The hinge's own speeds have rows where something imposes them or a rotor hangs on them."""
-    own, other = (frames.placements[name] for name in (cut.frame, cut.body))
-    turn = other.axes(own.rotation)
-    bound = [k for k in range(frame.nu) if frame.imposed[k] or frame.rotor[k]]
+def _cut_hinge_closure(frames: Frames, cut: Cut, place: int, frame: BodyNumbers) -> ClosureNumbers:
+    """Closure of a cut hinge; speeds that are prescribed or have a rotor get rows as well."""
+    frame_placement, body_placement = (frames.placements[name] for name in (cut.frame, cut.body))
+    turn = body_placement.axes(frame_placement.rotation)
+    constrained = [k for k in range(frame.nu) if frame.imposed[k] or frame.rotor[k]]
     return ClosureNumbers(
         place, frames.positions[cut.body], (*turn[0], *turn[1], *turn[2]),
-        other.point(own.origin), (*bound, *range(frame.nu, 6)),
+        body_placement.point(frame_placement.origin), (*constrained, *range(frame.nu, 6)),
     )  # fmt: skip

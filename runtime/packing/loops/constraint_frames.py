@@ -1,4 +1,4 @@
-"""What holds the frames of constraints."""
+"""Hinges that carry the frames of constraints."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from .curve_constraints import curve_hinge
 
 
 def frame_hinge(constraint: Constraint) -> Hinge:
-    """The hinge that holds the frame of a constraint where it begins: a weld, with z along the
-    normal where there is one, or a way along the curve.  Their names are those of no scene."""
+    """Hinge between the end `from` of a constraint and its frame, with a reserved name.
+
+    It is a weld, with z along the normal if there is one; of a point on a curve it moves along it.
+    """
     name, normal = f"{constraint.name}{OF_CONSTRAINT}", constraint.unit_normal
-    turned = IDENTITY if normal is None else axes_about(normal, None)
+    axes = IDENTITY if normal is None else axes_about(normal, None)
     weld = Hinge(name="frame", type="fixed", inboard=GROUND, outboard="frame",
-                 orientation=to_quaternion(turned))  # fmt: skip
+                 orientation=to_quaternion(axes))  # fmt: skip
     on_ground = split_reference(constraint.from_)[0] == GROUND
-    held = weld.model_copy(update={
+    weld = weld.model_copy(update={
         "name": name, "inboard": constraint.from_, "outboard": f"{name}/frame",
         "position": constraint.position if on_ground else (0.0, 0.0, 0.0),
     })  # fmt: skip
-    return curve_hinge(constraint, held) if constraint.type == CURVE else held
+    return curve_hinge(constraint, weld) if constraint.type == CURVE else weld

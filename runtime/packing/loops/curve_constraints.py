@@ -1,8 +1,8 @@
-"""A point on a curve: what moves along the curve is a hinge with one speed, made for it.
+"""Constraint of a point to a curve: a massless frame on a hinge that moves along the curve.
 
-The parameter s is a coordinate of its own, without mass: the point of the curve is where it says,
-and the other end is held across the curve.  So nothing has to search for the nearest point, a way
-that crosses itself is followed on, and turns around a closed curve are counted.
+The curve parameter s is the coordinate of that hinge; rows hold the other end in the frame across
+the curve.  So no search for the nearest point is needed, curves may intersect themselves, and
+revolutions around closed curves are counted.
 """
 
 from __future__ import annotations
@@ -33,52 +33,52 @@ _OUTPUTS = (Port("R", (3, 3)), Port("d", (3,)), Port("H", (6,)), Port("v", (3,))
 
 
 def curve_hinge(constraint: Constraint, held: Hinge) -> Hinge:
-    """The hinge `held` with the curve in place of its weld."""
-    name = _type(constraint)
-    moving = held.model_copy(update={
+    """Copy of the hinge `held` that moves along the curve of the constraint."""
+    name = _type_name(constraint)
+    hinge = held.model_copy(update={
         "type": name, "initial": Initial(q=(constraint.start or 0.0,), u=(0.0,))
     })  # fmt: skip
-    moving.__dict__["facts"] = HingeProperties(
+    hinge.__dict__["facts"] = HingeProperties(
         name, _TITLE, (_S,), (_RATE,), (), "own", (),
         name, None, True, False, ("qqq000",), _kernel(constraint),
     )  # fmt: skip
-    return moving
+    return hinge
 
 
 def curve_elements(constraints: Iterable[Constraint]) -> dict[Key, Element]:
-    """The hinges along curves, run by the interpreter."""
-    curves = [one for one in constraints if one.curve is not None]
-    return {("hinge", _type(curve)): _element(curve) for curve in curves}
+    """Elements of the hinges along curves, evaluated by the tape interpreter."""
+    curves = [constraint for constraint in constraints if constraint.curve is not None]
+    return {("hinge", _type_name(curve)): _element(curve) for curve in curves}
 
 
 def _element(constraint: Constraint) -> Element:
-    kernel, name = _kernel(constraint), _type(constraint)
-    slope = differentiate(kernel, ("q", "u"), None, values=False, guards=False)
-    made = ElementSpec("hinge", name, _TITLE, (_S,), (_RATE,), (), (kernel,))
+    kernel, name = _kernel(constraint), _type_name(constraint)
+    derivatives = differentiate(kernel, ("q", "u"), None, values=False, guards=False)
+    spec = ElementSpec("hinge", name, _TITLE, (_S,), (_RATE,), (), (kernel,))
     return Element(
-        "hinge", name, 1, 1, (), {}, {}, None, compile_tape(kernel), compile_tape(slope),
-        hash=made.hash(), spec=made,
+        "hinge", name, 1, 1, (), {}, {}, None, compile_tape(kernel), compile_tape(derivatives),
+        hash=spec.hash(), spec=spec,
     )  # fmt: skip
 
 
-def _type(constraint: Constraint) -> str:
+def _type_name(constraint: Constraint) -> str:
     return f"{constraint.name}/curve"
 
 
 def _kernel(constraint: Constraint) -> KernelIR:
-    """Motion of a hinge without rotation along c(s): d = c, H = c', bias c'' s'^2."""
+    """Kernel of a hinge that translates along c(s): d = c, H = c', bias acceleration c'' s'^2."""
     graph = Graph()
     s, rate = graph.element("q", 0), graph.element("u", 0)
-    zero, one = graph.constant(0), graph.constant(1)
+    zero, unit = graph.constant(0), graph.constant(1)
     assert constraint.curve is not None
-    place, slope, bend = zip(
+    position, first, second = zip(
         *(motion(entry, s, lambda _: s) for entry in constraint.curve), strict=True
     )
-    still = [zero] * 3
+    no_rotation = [zero] * 3
     values: dict[str, object] = {
-        "R": [[one if i == j else zero for j in range(3)] for i in range(3)],
-        "d": list(place), "H": [*slope, *still], "v": [rate * x for x in slope], "w": still,
-        "c": [*(rate * rate * x for x in bend), *still], "qdot": [rate],
+        "R": [[unit if i == j else zero for j in range(3)] for i in range(3)],
+        "d": list(position), "H": [*first, *no_rotation], "v": [rate * x for x in first],
+        "w": no_rotation, "c": [*(rate * rate * x for x in second), *no_rotation], "qdot": [rate],
     }  # fmt: skip
     inputs = [Port("p", (0,)), Port("q", (1,)), Port("u", (1,))]
     return graph.kernel("hinge", inputs, _OUTPUTS, values, purpose=_TITLE)

@@ -1,8 +1,8 @@
-"""A scene with closed loops -> the tree in which what closes them ends at frames of their own.
+"""Spanning tree of a scene with closed loops: cut hinges and constraints end at massless frames.
 
-The frame C of a cut hinge is a body without mass with the ends of the body B that it stands for, so
-that a hinge keeps its kernels, coordinates, law and drive, cut or not.  That C is where B is are
-the rows of the loop.  A constraint holds a frame of its own where it begins.
+The frame C of a cut hinge is a massless body with the ends of the body B that it replaces, so that
+the cut hinge keeps its kernels, coordinates, law and drive.  The constraint rows of the loop
+require that C coincides with B.  A constraint has a massless frame at its end `from`.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ from .loop_detection import may_have_loops
 
 @dataclass(frozen=True, slots=True)
 class Cut:
-    """What closes a loop: the frame of `hinge` stands for `body`, or for an end of it where it is
-    flexible, and has a name of its own.
+    """Closure of a loop, by names.
 
-    The hinge is one of the scene that is cut, or holds the frame of a `constraint`.
+    Attributes:
+        hinge: cut hinge, or the hinge that carries the frame of a constraint.
+        frame: massless body outboard of the hinge.
+        body: body that the frame must coincide with; an end of it if it is flexible.
+        constraint: None for a cut hinge.
     """
 
     hinge: str
@@ -32,24 +35,24 @@ class Cut:
 
 
 def cut_loops(scene: Scene) -> tuple[Scene, tuple[Cut, ...]]:
-    """The tree, and what closes its loops: cut hinges, then constraints; a tree is its own."""
+    """Scene with a tree topology, and the closures: cut hinges, then constraints."""
     if not may_have_loops(scene):
         return scene, ()
     plan = build_topology(scene.skeleton).plan
     if plan is None or not (plan.cut or scene.constraint):
         return scene, ()
     tables, bodies, cuts = list(scene.hinge), list(scene.body), list[Cut]()
-    bends = {one.name for one in (*scene.beam, *scene.elastic)}
+    flexible = {body.name for body in (*scene.beam, *scene.elastic)}
     for number in plan.cut:
         hinge = tables[number]
         end, name = hinge.outboard_end, f"{hinge.name}/cut"
         cut, ends = Cut(hinge.name, name, hinge.outboard_body), dict[str, End]()
-        if cut.body in bends:
+        if cut.body in flexible:
             cut, end = replace(cut, body=hinge.outboard), ""
         else:
             ends = scene.bodies.by_name[cut.body].ends
-        held = {"outboard": f"{name}.{end}" if end else name, "cut": None}
-        tables[number] = hinge.model_copy(update=held)
+        update = {"outboard": f"{name}.{end}" if end else name, "cut": None}
+        tables[number] = hinge.model_copy(update=update)
         bodies.append(_frame(cut.frame, ends))
         cuts.append(cut)
     for constraint in scene.constraint:

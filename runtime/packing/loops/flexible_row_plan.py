@@ -1,7 +1,8 @@
-"""The tree of rows: every flexible body is two places, its frame and what its modes move.
+"""Plan of constraint rows with flexible bodies, each of which is two nodes of the row tree.
 
-What hangs on its ends hangs on the second, so that rows are coupled across modes as across a hinge,
-and a row between two ends closes on the frame.
+The outer node is the floating frame, the inner one stands for its ends, which the modes move;
+bodies on these ends are children of the inner node.  So rows are coupled across modes as across a
+hinge, and a row between two ends of one body closes on the frame.
 """
 
 from __future__ import annotations
@@ -16,52 +17,57 @@ from .row_plan import plan_rows
 
 
 class FlexibleRowPlan:
-    """A plan of rows by bodies: `rows`, `of`, `pairs` and `pending` as of `RowPlan`; `bent` are the
-    rows that pass the modes of a flexible body, ascending."""
+    """Row plan in terms of bodies.
+
+    Attributes:
+        rows, of, pairs, pending: as in `RowPlan`.
+        bent: flexible body -> rows that pass its modes, ascending.
+    """
 
     def __init__(self, system: System, groups: Sequence[RowGroup]) -> None:
-        places = _Places(system)
-        ends = [tuple(map(places.outer, group.ends)) for group in groups]
+        nodes = _RowTree(system)
+        ends = [tuple(map(nodes.outer, group.ends)) for group in groups]
         counts = [group.count for group in groups]
-        plan = plan_rows(places.parents, _rows(ends, counts))
-        inside = {row.group: row.body for row in plan.rows if places.is_inner(row.body)}
-        if inside:
-            for group, place in inside.items():
-                ends[group] = (*ends[group], place - 1)
-            plan = plan_rows(places.parents, _rows(ends, counts))
+        plan = plan_rows(nodes.parents, _row_groups(ends, counts))
+        inner = {row.group: row.body for row in plan.rows if nodes.is_inner(row.body)}
+        if inner:
+            for group, node in inner.items():
+                ends[group] = (*ends[group], node - 1)  # the outer node, so that it closes there
+            plan = plan_rows(nodes.parents, _row_groups(ends, counts))
         self.of, self.pairs = plan.of, plan.pairs
-        self.rows = [replace(row, body=places.body(row.body)) for row in plan.rows]
+        self.rows = [replace(row, body=nodes.body(row.body)) for row in plan.rows]
         self.pending, self.bent = dict[int, list[int]](), dict[int, list[int]]()
-        for place, rows in plan.pending.items():
-            passed = self.bent if places.is_inner(place) else self.pending
-            passed[places.body(place)] = rows
+        for node, rows in plan.pending.items():
+            rows_by_body = self.bent if nodes.is_inner(node) else self.pending
+            rows_by_body[nodes.body(node)] = rows
 
 
-class _Places:
-    """Places of the tree of rows; `parents` are theirs."""
+class _RowTree:
+    """Tree with two nodes for each flexible body; `parents` are the parents of the nodes."""
 
     def __init__(self, system: System) -> None:
         self._first, self._body = list[int](), list[int]()
-        for body, bends in enumerate(system.rows(lambda one: one.modal is not None).tolist()):
+        is_flexible = system.rows(lambda body: body.modal is not None).tolist()
+        for body, flexible in enumerate(is_flexible):
             self._first.append(len(self._body))
-            self._body += [body] * (2 if bends else 1)
+            self._body += [body] * (2 if flexible else 1)
         last = [*self._first[1:], len(self._body)]
         self.parents = [self._first[body] for body in self._body]
         for body, parent in enumerate(system.parents.tolist()):
             self.parents[self._first[body]] = GROUND if parent == GROUND else last[parent] - 1
 
     def outer(self, body: int) -> int:
-        """The place whose inboard hinge is that of a body."""
+        """Node of a rigid body, or outer node of a flexible one."""
         return GROUND if body == GROUND else self._first[body]
 
-    def body(self, place: int) -> int:
-        """The body at a place."""
-        return GROUND if place == GROUND else self._body[place]
+    def body(self, node: int) -> int:
+        """Body of a node."""
+        return GROUND if node == GROUND else self._body[node]
 
-    def is_inner(self, place: int) -> bool:
-        """Whether it is what the modes of a flexible body move."""
-        return place != GROUND and self._first[self._body[place]] != place
+    def is_inner(self, node: int) -> bool:
+        """Whether a node is the inner one of a flexible body."""
+        return node != GROUND and self._first[self._body[node]] != node
 
 
-def _rows(ends: Sequence[tuple[int, ...]], counts: Sequence[int]) -> list[RowGroup]:
-    return [RowGroup(each, count) for each, count in zip(ends, counts, strict=True)]
+def _row_groups(ends: Sequence[tuple[int, ...]], counts: Sequence[int]) -> list[RowGroup]:
+    return [RowGroup(bodies, count) for bodies, count in zip(ends, counts, strict=True)]

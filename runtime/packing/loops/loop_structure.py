@@ -1,4 +1,4 @@
-"""Closed loops of a system -> their part of the structure of fused code."""
+"""Closed loops in the structure of fused code."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .row_plan import row_groups
 
 
 class EntrySorter(Protocol):
-    """Sorts numbers into structural constants and places in p."""
+    """Function that sorts numbers into structural constants and indices of p."""
 
     def __call__(self, values: Iterable[float], axes: bool = False) -> Entries: ...
 
@@ -32,76 +32,80 @@ def with_loops(
     tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...],
     tuple[CouplingStructure, ...],
 ]:  # fmt: skip
-    """The bodies with the rows that are open across their hinges, closures in the order of their
-    frames, rows, and couplings.  `floors` go by row; without them a pivot counts that is more than
-    zero."""
+    """Bodies with their pending rows, closures in the order of their frames, rows, and couplings.
+
+    `floors` are the pivots (rows,) below which they count as rounding; without them it is zero.
+    """
     plan = FlexibleRowPlan(system, row_groups([body.parent for body in bodies], system))
-    soft: dict[int, Entries] = {}
+    inertia: dict[int, Entries] = {}
     closures = [
-        _closure(one, plan.of[group], bodies[one.frame], sort, soft)
-        for group, one in enumerate(system.closures)
+        _closure(closure, plan.of[group], bodies[closure.frame], sort, inertia)
+        for group, closure in enumerate(system.closures)
     ]
-    left = (of[0] for of in plan.of[len(closures) :])
+    coupling_rows = (rows[0] for rows in plan.of[len(closures) :])
     couplings = tuple(
-        _coupling(one, -1 if one.repeats else next(left), bodies, sort) for one in system.couplings
+        _coupling(coupling, -1 if coupling.repeats else next(coupling_rows), bodies, sort)
+        for coupling in system.couplings
     )
     of_speeds = {
         row
-        for group, one in enumerate(system.closures)
-        for row, direction in zip(plan.of[group], one.directions, strict=True)
-        if direction in one.of_speeds
+        for group, closure in enumerate(system.closures)
+        for row, direction in zip(plan.of[group], closure.directions, strict=True)
+        if direction in closure.of_speeds
     }
-    of_speeds |= {one.row for one in couplings if one.of_speeds}
+    of_speeds |= {coupling.row for coupling in couplings if coupling.of_speeds}
     rests: dict[int, int] = {}
-    for group, one in enumerate(system.closures):
-        own = [number for number in plan.of[group] if number not in soft]
-        if one.choice is not None:
-            rests |= {row: one.choice[0] + k for k, row in enumerate(own)}
+    for group, closure in enumerate(system.closures):
+        if closure.choice is not None:
+            without_rotors = [row for row in plan.of[group] if row not in inertia]
+            rests |= {row: closure.choice[0] + k for k, row in enumerate(without_rotors)}
     rows = tuple(
         RowStructure(
-            row.body, row.others, sort(floors[number : number + 1]), soft.get(number, ()),
+            row.body, row.others, sort(floors[number : number + 1]), inertia.get(number, ()),
             number in of_speeds, rests.get(number, -1),
         )
         for number, row in enumerate(plan.rows)
     )  # fmt: skip
-    closures.sort(key=lambda one: one.frame)
-    return _pending(bodies, plan), tuple(closures), rows, couplings
+    closures.sort(key=lambda closure: closure.frame)
+    return _with_pending_rows(bodies, plan), tuple(closures), rows, couplings
 
 
 def _coupling(
-    one: CouplingNumbers, row: int, bodies: Sequence[BodyStructure], sort: EntrySorter
+    coupling: CouplingNumbers, row: int, bodies: Sequence[BodyStructure], sort: EntrySorter
 ) -> CouplingStructure:
-    columns, at = list[tuple[int, int]](), one.first + len(COUPLING_NUMBERS)
-    for hinge in one.hinges:
-        columns.append((hinge.place, at))
-        at += bodies[hinge.place].nu
-    kept = sort(() if one.kept is None else (one.kept,))
-    unasked = one.of_speeds or one.kept is None
-    return CouplingStructure(row, one.first, unasked, kept, tuple(columns))
+    columns, column = list[tuple[int, int]](), coupling.first + len(COUPLING_NUMBERS)
+    for hinge in coupling.hinges:
+        columns.append((hinge.place, column))
+        column += bodies[hinge.place].nu
+    kept = sort(() if coupling.kept is None else (coupling.kept,))
+    of_speeds = coupling.of_speeds or coupling.kept is None
+    return CouplingStructure(row, coupling.first, of_speeds, kept, tuple(columns))
 
 
-def _pending(bodies: Sequence[BodyStructure], plan: FlexibleRowPlan) -> tuple[BodyStructure, ...]:
-    def passing(place: int, body: BodyStructure) -> BodyStructure:
+def _with_pending_rows(
+    bodies: Sequence[BodyStructure], plan: FlexibleRowPlan
+) -> tuple[BodyStructure, ...]:
+    def with_rows(place: int, body: BodyStructure) -> BodyStructure:
         pending, bent = plan.pending.get(place, ()), plan.bent.get(place, ())
         return replace(body, pending=tuple(pending), bent=tuple(bent)) if pending or bent else body
 
-    return tuple(passing(place, body) for place, body in enumerate(bodies))
+    return tuple(with_rows(place, body) for place, body in enumerate(bodies))
 
 
 def _closure(
-    one: ClosureNumbers,
-    own: range,
+    closure: ClosureNumbers,
+    own_rows: range,
     frame: BodyStructure,
     sort: EntrySorter,
-    soft: dict[int, Entries],
+    inertia: dict[int, Entries],
 ) -> ClosureStructure:
-    """A closure; rows of rotors get their inertia in `soft`."""
-    rows = [-1 if direction < one.asked else -2 for direction in range(6)]
-    for row, direction in zip(own, one.directions, strict=True):
+    """Structure of a closure; adds the inertia of rotors by row to `inertia`."""
+    rows = [-1 if direction < closure.asked else -2 for direction in range(6)]
+    for row, direction in zip(own_rows, closure.directions, strict=True):
         rows[direction] = row
         if direction < frame.nu and not frame.imposed[direction]:
-            soft[row] = (frame.rotor[direction],)
+            inertia[row] = (frame.rotor[direction],)
     return ClosureStructure(
-        one.frame, one.outboard, sort(one.turn, axes=True), sort(one.end), tuple(rows), one.kind,
-        (*sort(one.p[:2]), *sort(one.p[2:], axes=True)),
+        closure.frame, closure.outboard, sort(closure.turn, axes=True), sort(closure.end),
+        tuple(rows), closure.kind, (*sort(closure.p[:2]), *sort(closure.p[2:], axes=True)),
     )  # fmt: skip

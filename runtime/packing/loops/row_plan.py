@@ -1,7 +1,7 @@
-"""Rows of closed loops one by one, in the order in which a sweep closes them, and what it keeps.
+"""Plan of single constraint rows, in the order in which a sweep closes them.
 
-Bodies are places in the tree here, -1 the ground.  The graph plans groups of rows; in a group every
-row is coupled with all others, and the first is closed first.
+Bodies are positions in the tree here, -1 the ground.  The graph plans groups of rows; in a group
+every row is coupled with all others, and the first is closed first.
 """
 
 from __future__ import annotations
@@ -18,8 +18,13 @@ from ..system import System
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row of group `group` that is closed on `body`; `others` are the rows still open with which
-    it is coupled, ascending."""
+    """Constraint row of a group.
+
+    Attributes:
+        group: number of its group.
+        body: body on which it closes.
+        others: rows still open that it is coupled with, ascending.
+    """
 
     group: int
     body: int
@@ -27,47 +32,55 @@ class Row:
 
 
 class RowPlan:
-    """`rows` as they close, `of` the rows of each group, `pending` by body the rows that pass its
-    inboard hinge, ascending."""
+    """Plan of all rows.
+
+    Attributes:
+        rows: in the order of their closure.
+        of: numbers of the rows of each group.
+        pending: body -> rows that pass its inboard hinge, ascending.
+    """
 
     def __init__(self, plan: ClosurePlan) -> None:
         self.of: list[range] = [range(0)] * len(plan.groups)
-        behind = 0
-        for one in plan.closings:
-            count = plan.groups[one.group].count
-            self.of[one.group], behind = range(behind, behind + count), behind + count
-        self.rows = [row for one in plan.closings for row in self._closed(one)]
+        first = 0
+        for closing in plan.closings:
+            count = plan.groups[closing.group].count
+            self.of[closing.group], first = range(first, first + count), first + count
+        self.rows = [row for closing in plan.closings for row in self._group_rows(closing)]
         self.pending = {
-            body: self._expanded(groups) for body, groups in enumerate(plan.pending) if groups
+            body: self._row_numbers(groups) for body, groups in enumerate(plan.pending) if groups
         }
 
     @cached_property
     def pairs(self) -> list[tuple[int, int]]:
         """Pairs of different rows that share an entry of L."""
-        return [(row, other) for row, one in enumerate(self.rows) for other in one.others]
+        return [(number, other) for number, row in enumerate(self.rows) for other in row.others]
 
-    def _expanded(self, groups: Sequence[int]) -> list[int]:
+    def _row_numbers(self, groups: Sequence[int]) -> list[int]:
         return sorted(row for group in groups for row in self.of[group])
 
-    def _closed(self, one: GroupClosure) -> list[Row]:
-        own, coupled = self.of[one.group], self._expanded(one.coupled)
-        return [Row(one.group, one.body, (*own[k + 1 :], *coupled)) for k in range(len(own))]
+    def _group_rows(self, closing: GroupClosure) -> list[Row]:
+        own, coupled = self.of[closing.group], self._row_numbers(closing.coupled)
+        return [
+            Row(closing.group, closing.body, (*own[k + 1 :], *coupled)) for k in range(len(own))
+        ]
 
 
 def plan_rows(parents: Sequence[int], groups: Sequence[RowGroup]) -> RowPlan:
-    """How groups of rows between places of a tree close, in which bodies hang on their parents."""
+    """Plan the closure of groups of rows in the tree with these parents."""
     hinges = tuple(Edge(parent, body, 0) for body, parent in enumerate(parents))
     mechanism = MechanismGraph(len(parents), hinges, tuple(groups))
     return RowPlan(plan_closures(mechanism, tuple(range(len(parents)))))
 
 
 def row_groups(parents: Sequence[int], system: System) -> list[RowGroup]:
-    """The groups of rows of a system: of its closures, then of the couplings that have one."""
+    """Groups of rows of a system: of its closures, then of the couplings that have a row."""
     groups = [
-        RowGroup((parents[one.frame], one.outboard), len(one.directions)) for one in system.closures
+        RowGroup((parents[closure.frame], closure.outboard), len(closure.directions))
+        for closure in system.closures
     ]
     ends = (
-        tuple(end for hinge in one.hinges for end in (hinge.inboard, hinge.outboard))
-        for one in system.couplings if not one.repeats
+        tuple(end for hinge in coupling.hinges for end in (hinge.inboard, hinge.outboard))
+        for coupling in system.couplings if not coupling.repeats
     )  # fmt: skip
     return groups + [RowGroup(pair, 1) for pair in ends]

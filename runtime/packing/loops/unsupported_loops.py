@@ -1,4 +1,4 @@
-"""What cannot be asked yet of scenes whose loops are closed, one message for all of it."""
+"""Rejection of methods that do not support closed loops."""
 
 from __future__ import annotations
 
@@ -16,50 +16,47 @@ if TYPE_CHECKING:
 
 
 def reject_loops(packed: PackedScene, what: str, instead: str) -> None:
-    """SceneError where loops are closed, which `what` cannot follow; `instead` does."""
+    """Raise SceneError if there are closed loops: `what` does not support them; use `instead`."""
     if not packed.system.closes:
         return
     scene = packed.described.skeleton
     plan = build_topology(scene).plan
     assert plan is not None
     raise SceneError(
-        f"scene: {loop_label(scene, plan)} is closed, and {what} cannot follow that yet; {instead}"
+        f"scene: {what} does not support closed loops, found {loop_label(scene, plan)}; {instead}"
     )
 
 
 def reject_speed_constraints(packed: PackedScene, method: str) -> None:
-    """SceneError for rows of speeds, which a method on positions does not meet."""
+    """Raise SceneError if there are constraints on speeds, for a method on positions."""
     scene = packed.described
-    names = [f'coupling "{one.name}"' for one in scene.coupling if one.speeds is not None]
-    names += [f'constraint "{one.name}"' for one in scene.constraint if one.type == ROLLING]
+    names = [f'coupling "{c.name}"' for c in scene.coupling if c.speeds is not None]
+    names += [f'constraint "{c.name}"' for c in scene.constraint if c.type == ROLLING]
     if names:
         raise SceneError(
-            f'scene: {names[0]} asks for speeds, which method "{method}" on positions does not; '
-            f"take {method.removesuffix(INDEX3_SUFFIX)}"
+            f'scene: method "{method}" needs constraints on positions, found {names[0]} on speeds; '
+            f"use {method.removesuffix(INDEX3_SUFFIX)}"
         )
 
 
 def reject_constraints(packed: PackedScene, what: str, instead: str) -> None:
-    """SceneError where more than hinges closes loops, which `what` cannot follow yet; `instead`
-    does."""
+    """Raise SceneError if there are constraints or couplings, which `what` does not support."""
     scene = packed.described
-    names = [f'coupling "{one.name}"' for one in scene.coupling]
-    names += [f'constraint "{one.name}"' for one in scene.constraint]
+    names = [f'coupling "{coupling.name}"' for coupling in scene.coupling]
+    names += [f'constraint "{constraint.name}"' for constraint in scene.constraint]
     if names:
         raise SceneError(
-            f"scene: {names[0]} closes a loop, and {what} cannot follow that yet; {instead}"
+            f"scene: {what} does not support constraints and couplings, found {names[0]}; {instead}"
         )
 
 
-#: Methods that take increments of loads or an exponential of the whole motion, which closed loops
-#: are not brought into.
-_ALIEN = ("dttmm", "exprb32")
+#: Methods without a formulation for closed loops: increments of loads, exponential integrators.
+_METHODS_OF_TREES = ("dttmm", "exprb32")
 
 
 def reject_loop_method(packed: PackedScene, method: str, tangent: str) -> None:
-    """SceneError where loops are closed, for an implicit method that cannot follow them, and for
-    the tangent of laws alone."""
-    if method in _ALIEN:
+    """Raise SceneError for closed loops that the method or the tangent does not support."""
+    if method in _METHODS_OF_TREES:
         reject_loops(packed, f'method "{method}"', "genalpha and rodas4p2 do")
     if tangent == "laws":
-        reject_loops(packed, 'tangent = "laws"', 'take tangent = "exact"')
+        reject_loops(packed, 'tangent = "laws"', 'use tangent = "exact"')

@@ -1,1 +1,1 @@
-"""Several bodies as one."""
+"""Simplifications of a scene that do not change its motion: merged bodies, exact right angles."""

@@ -1,4 +1,4 @@
-"""Bodies and hinges that a scene speaks of by what only they have, so that they stay."""
+"""Bodies and hinges that expressions, outputs and events refer to; simplifications keep them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from mstmm.scene.checks.expression_names import POINT_QUANTITIES
 
 @dataclass(frozen=True)
 class ReferencedParts:
-    """What stays.
+    """Names of bodies and hinges that simplifications must keep.
 
     Attributes:
-        bodies: of which more is asked than where their origins and ends are.
-        places: these, and those of which it is asked where they are, too.
-        hinges: that are released, or of which something is asked.
+        bodies: referenced by more than positions and velocities of their origin and ends.
+        places: referenced in any way.
+        hinges: released or referenced.
     """
 
     bodies: frozenset[str]
@@ -27,20 +27,20 @@ class ReferencedParts:
 
 
 def referenced_parts(scene: Scene, keep: Collection[str] = ()) -> ReferencedParts:
-    """What expressions, outputs and events of a scene speak of, and what is to be kept."""
+    """Parts that the scene refers to, and those named in `keep`."""
     names = [name for table in scene for name in _names(table) if len(name.parts) > 1]
     ends = {body.name: set(body.ends) for body in scene.skeleton.body}
-    asked = {name.owner for name in names if not _a_place(name, ends)} | {*keep}
+    owners = {name.owner for name in names if not _is_point(name, ends)} | {*keep}
     released = {event.hinge for event in scene.event if event.hinge is not None}
     return ReferencedParts(
-        frozenset(asked),
-        frozenset(asked | {name.owner for name in names}),
-        frozenset(released | asked | {name.hinge for name in names}),
+        frozenset(owners),
+        frozenset(owners | {name.owner for name in names}),
+        frozenset(released | owners | {name.hinge for name in names}),
     )
 
 
-def _a_place(name: Name, ends: dict[str, set[str]]) -> bool:
-    """Whether it is a coordinate of a body's origin or of one of its ends, or its rate."""
+def _is_point(name: Name, ends: dict[str, set[str]]) -> bool:
+    """Whether a name is a position or velocity component of a body's origin or end."""
     return (
         name.quantity in POINT_QUANTITIES
         and name.owner in ends
@@ -49,6 +49,7 @@ def _a_place(name: Name, ends: dict[str, set[str]]) -> bool:
 
 
 def _names(value: Any) -> Iterator[Name]:
+    """Names in all expressions of a table or container."""
     if isinstance(value, Expression):
         yield from value.names
     elif isinstance(value, (list, tuple)):

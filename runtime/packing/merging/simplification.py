@@ -1,4 +1,4 @@
-"""What is packed otherwise than a scene says it, without changing what it does."""
+"""Simplifications: changes of a scene at compilation that do not change its motion."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from mstmm.argument_validation import abbreviate, require_texts
 from mstmm.array_validation import finite_float
 from mstmm.errors import SceneError
 
-#: Rigid bodies on fixed hinges are packed as one; orientations near quarter turns are exact; bodies
-#: behind hinges that move about and along one axis, or turn about a point, are swept as links.
+#: Kinds: rigid bodies on fixed hinges are merged; orientations near right angles become exact;
+#: bodies on hinges that move about or along one axis, or rotate about a point, are swept as links.
 WELDS, TURNS, LINKS = "welds", "turns", "links"
 
-#: Kind -> what is counted of it, one and many, and what becomes of them: what a user may wonder at.
+#: Kind -> singular, plural and description, for the kinds that are reported to users.
 COUNTED = {
-    WELDS: ("body", "bodies", "on fixed hinges packed as part of what holds them"),
-    TURNS: ("orientation", "orientations", "within a tolerance of quarter turns taken as these"),
+    WELDS: ("body", "bodies", "on fixed hinges merged into their inboard body"),
+    TURNS: ("orientation", "orientations", "within a tolerance of right angles replaced by these"),
 }
-#: Word -> whether it is done, or up to which tolerance.
+#: Kind -> whether it is done, or up to which tolerance.
 Words = Mapping[str, bool | float]
-#: What is done where nothing is asked, and what a word means by itself.  Orientations may be off by
-#: so many rad: files write quarter turns as 1.57079632679, which is off by 4.9e-12, and two such
-#: angles add up.  Numbers of fewer digits (1.570796327: 2e-10 off, 1.5708: 4e-6) change results by
-#: more than rounding does, so that a larger tolerance has to be asked for.
+#: Default simplifications, and the default of each kind.  The tolerance (rad) admits right angles
+#: written as 1.57079632679, which are off by 4.9e-12, and sums of two.  Numbers with fewer digits
+#: (1.570796327: 2e-10 off, 1.5708: 4e-6) change results by more than rounding, so that a larger
+#: tolerance must be requested.
 USUAL: Words = {WELDS: True, TURNS: 1e-11, LINKS: True}
 LINKED: Words = {LINKS: True}
 NOTHING: Words = {}
-#: The largest tolerance, rad.
-_MOST = 0.01
+#: Largest tolerance, rad.
+_MAX_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
 class Simplification:
-    """One thing that is packed otherwise.
+    """Simplification of one part of a scene.
 
     Attributes:
-        kind: the word that switches it on: "welds", "turns" or "links".
+        kind: "welds", "turns" or "links".
         elements: names of the hinges, bodies and ends concerned.
-        text: what was done, and why.
+        text: description and reason.
     """
 
     kind: str
@@ -52,33 +52,35 @@ class Simplification:
 
 
 def parse_simplify(simplify: bool | Collection[str] | Words) -> Words:
-    """The words that an option means, others as usual where it is a table; SceneError for words
-    that are not known."""
+    """Parse the option `simplify`; a table keeps the defaults of the kinds that it does not name.
+
+    Raises SceneError for unknown kinds and invalid values.
+    """
     if isinstance(simplify, bool):
         return USUAL if simplify else NOTHING
-    words = require_texts("simplify", list(simplify) if isinstance(simplify, Mapping) else simplify,
+    kinds = require_texts("simplify", list(simplify) if isinstance(simplify, Mapping) else simplify,
                      "welds")  # fmt: skip
-    for word in words:
-        if word not in USUAL:
+    for kind in kinds:
+        if kind not in USUAL:
             raise SceneError(
-                f"simplify: {word!r:.60} is not known; expected True, False, or some of: "
-                + ", ".join(USUAL)
+                f"simplify: expected True, False, or some of {', '.join(USUAL)}; found {kind!r:.60}"
             )
     if not isinstance(simplify, Mapping):
-        return {word: USUAL[word] for word in words}
-    for word in (WELDS, LINKS):
-        _check_switch(word, simplify.get(word, True))
-    found = {word: USUAL[word] if given is True else given for word, given in simplify.items()}
-    found = {**USUAL, **found}
-    turns = finite_float("simplify: turns", found.get(TURNS) or 0.0)
-    if not 0 <= turns <= _MOST:
+        return {kind: USUAL[kind] for kind in kinds}
+    for kind in (WELDS, LINKS):
+        _check_switch(kind, simplify.get(kind, True))
+    options = {kind: USUAL[kind] if value is True else value for kind, value in simplify.items()}
+    options = {**USUAL, **options}
+    turns = finite_float("simplify: turns", options.get(TURNS) or 0.0)
+    if not 0 <= turns <= _MAX_TOLERANCE:
         raise SceneError(
-            f"simplify: turns = {turns!r}: expected an angle from 0 to {_MOST} rad, or True for "
-            f"{USUAL[TURNS]:g}"
+            f"simplify: turns = {turns!r}: expected an angle from 0 to {_MAX_TOLERANCE} rad, or "
+            f"True for {USUAL[TURNS]:g}"
         )
-    return {word: given for word, given in found.items() if given}
+    return {kind: value for kind, value in options.items() if value}
 
 
-def _check_switch(word: str, given: object) -> None:
-    if not (isinstance(given, bool | int | np.bool_) and given in (0, 1)):
-        raise SceneError(f"simplify: {word}: expected True or False, found {abbreviate(given)}")
+def _check_switch(kind: str, value: object) -> None:
+    """Raise SceneError unless a value is a boolean."""
+    if not (isinstance(value, bool | int | np.bool_) and value in (0, 1)):
+        raise SceneError(f"simplify: {kind}: expected True or False, found {abbreviate(value)}")

@@ -1,4 +1,4 @@
-"""Bodies that a fixed hinge welds: how they lie to each other, and both as one body."""
+"""Geometry of welds: relative pose of two bodies on a fixed hinge, and their merged body."""
 
 from __future__ import annotations
 
@@ -10,30 +10,29 @@ from mstmm.scene.robots.robot_model import Link
 
 
 def to_orientation(pose: Pose) -> Quaternion | Vector:
-    """The axes of a frame as a scene's tables hold them."""
+    """Orientation of a frame as stored in the tables of a scene."""
     return ZERO if pose.rotation == IDENTITY else to_quaternion(pose.rotation)
 
 
 def to_end(pose: Pose) -> End:
-    """An end that lies so."""
+    """End of a body with this pose."""
     return End(position=pose.position, orientation=to_orientation(pose))
 
 
 def end_pose(body: Body, at: str) -> Pose:
-    """An end of a body in its axes; "" is its origin."""
+    """Pose of an end in the axes of its body; "" is the origin."""
     return Pose(body.end_position(at), body.end_rotation(at))
 
 
 def weld_pose(weld: Hinge, inboard: Body | None, outboard: Body) -> Pose:
-    """The outboard body in the axes of the inboard one; None: of the ground."""
-    held = Pose(weld.position) if inboard is None else end_pose(inboard, weld.inboard_end)
-    return held.then(Pose(ZERO, weld.rotation)).then(end_pose(outboard, weld.outboard_end).inverse)
+    """Pose of the outboard body in the axes of the inboard one (None: the ground)."""
+    end = Pose(weld.position) if inboard is None else end_pose(inboard, weld.inboard_end)
+    return end.then(Pose(ZERO, weld.rotation)).then(end_pose(outboard, weld.outboard_end).inverse)
 
 
 def merged_body(whole: Body, part: Body, pose: Pose) -> Body:
-    """The first body with the second one's mass and inertia, in the axes of the first; `pose` is
-    that of the second in them."""
-    mass, center, inertia = merge_inertia([(_alone(whole), IDENTITY_POSE), (_alone(part), pose)])
+    """Body `whole` with the mass and inertia of `part`, given its pose in the axes of `whole`."""
+    mass, center, inertia = merge_inertia([(_link(whole), IDENTITY_POSE), (_link(part), pose)])
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia
     return whole.model_copy(
         update={
@@ -45,5 +44,5 @@ def merged_body(whole: Body, part: Body, pose: Pose) -> Body:
     )  # fmt: skip
 
 
-def _alone(body: Body) -> Link:
+def _link(body: Body) -> Link:
     return Link(body.name, body.mass, body.center_of_mass, body.inertia_matrix)

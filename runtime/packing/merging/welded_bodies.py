@@ -1,7 +1,7 @@
-"""Rigid bodies on fixed hinges as part of the bodies that hold them.
+"""Rigid bodies on fixed hinges, merged into their inboard bodies (carriers) in the tree.
 
-The scene keeps them, with their names and ends; in the tree their mass is that of the body that
-carries them, and what hangs on them hangs on it.
+The scene keeps them, with their names and ends; in the tree their mass belongs to the carrier, and
+their children are its children.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from .weld_geometry import weld_pose
 
 @dataclass(frozen=True)
 class WeldedBodies:
-    """Bodies that others carry, by their numbers in the scene of nodes.
+    """Merged bodies, by their numbers in the scene of nodes.
 
     Attributes:
-        by: body -> the body that carries it, which none carries.
-        poses: body -> its axes in those of the one that carries it.
-        welds: body -> the hinge that welds it.
+        by: merged body -> its carrier, which is not merged itself.
+        poses: merged body -> its pose in the axes of the carrier.
+        welds: merged body -> its fixed hinge.
     """
 
     by: Mapping[int, int] = field(default_factory=dict)
@@ -37,68 +37,70 @@ class WeldedBodies:
     welds: Mapping[int, int] = field(default_factory=dict)
 
     def placed(self, body: int, whole: Placement) -> Placement:
-        """The internal frame of the body that carries another one, as that one has it."""
-        seen = self.poses[body].inverse.then(Pose(whole.origin, whole.rotation))
-        return Placement(seen.rotation, seen.position)
+        """Internal frame `whole` of the carrier in the axes of a merged body."""
+        pose = self.poses[body].inverse.then(Pose(whole.origin, whole.rotation))
+        return Placement(pose.rotation, pose.position)
 
     @cached_property
     def parts(self) -> dict[int, list[int]]:
-        """Body -> the bodies that it carries."""
-        found: dict[int, list[int]] = {}
-        for body, whole in self.by.items():
-            found.setdefault(whole, []).append(body)
-        return found
+        """Carrier -> bodies merged into it."""
+        parts: dict[int, list[int]] = {}
+        for body, carrier in self.by.items():
+            parts.setdefault(carrier, []).append(body)
+        return parts
 
     def told(self, scene: Scene) -> Iterator[Simplification]:
-        """A record for each."""
-        for body, whole in self.by.items():
-            weld, part, one = scene.hinge[self.welds[body]], scene.body[body], scene.body[whole]
+        """Records of all merged bodies."""
+        for body, carrier in self.by.items():
+            weld, name = scene.hinge[self.welds[body]], scene.body[body].name
+            carrier_name = scene.body[carrier].name
             yield Simplification(
-                WELDS, (weld.name, part.name, one.name),
-                f'body "{part.name}" is packed as part of "{one.name}": the fixed hinge '
-                f'"{weld.name}" welds them, and nothing asks for its load in a run',
+                WELDS, (weld.name, name, carrier_name),
+                f'body "{name}": merged into "{carrier_name}", as hinge "{weld.name}" between '
+                "them is fixed and its load is not used during a run",
             )  # fmt: skip
 
 
 def find_welded_bodies(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
-    """Every rigid body that a fixed hinge of the user's welds to another rigid one.
+    """Find the rigid bodies to be merged: those that a fixed hinge of the scene welds to another.
 
-    Not those whose hinge may let go or whose load a run looks at, and sections of flexible bodies;
-    nor any where bodies respond elastically behind the run, or where loops are closed, whose start
-    is the nearest one by the inertia of the bodies next to what closes.
+    Excluded are hinges that may be released or whose load is used during the run, and sections of
+    flexible bodies.  Nothing is merged with one-way coupled bodies, or with closed loops, whose
+    assembly depends on the inertia of the bodies at the cut hinges.
     """
     scene, rigidified = expanded.scene, expanded.rigidified
-    held = [run for run in tree.runs if _welds(run, expanded)]
-    if not held or expanded.cuts or (rigidified is not None and rigidified.one_way):
+    candidates = [run for run in tree.runs if _is_welded(run, expanded)]
+    if not candidates or expanded.cuts or (rigidified is not None and rigidified.one_way):
         return WeldedBodies()
-    spoken = referenced_parts(expanded.described).hinges
+    referenced_hinges = referenced_parts(expanded.described).hinges
     by, poses, welds = dict[int, int](), dict[int, Pose](), dict[int, int]()
-    for run in held:
-        weld, inner, body = scene.hinge[run.hinge], scene.body[run.on], scene.body[run.body]
-        if weld.name in spoken or not all(_alone(one, expanded) for one in (inner, body)):
+    for run in candidates:
+        weld, inboard, body = scene.hinge[run.hinge], scene.body[run.on], scene.body[run.body]
+        are_rigid = _is_rigid(inboard, expanded) and _is_rigid(body, expanded)
+        if weld.name in referenced_hinges or not are_rigid:
             continue
-        pose = weld_pose(weld, inner, body)
+        pose = weld_pose(weld, inboard, body)
         poses[run.body] = poses[run.on].then(pose) if run.on in poses else pose
         by[run.body], welds[run.body] = by.get(run.on, run.on), run.hinge
     return WeldedBodies(by, poses, welds)
 
 
-def _welds(run: BodyRow, expanded: ExpandedScene) -> bool:
-    """Whether a run is a body on a fixed hinge of the user's, which holds, to another body."""
-    scene, own = expanded.scene, len(expanded.described.hinge)
-    if run.hinge >= own or not 0 <= run.on < len(scene.body):
+def _is_welded(run: BodyRow, expanded: ExpandedScene) -> bool:
+    """Whether a run is a body on a permanent fixed hinge of the user's scene to another body."""
+    scene, user_hinges = expanded.scene, len(expanded.described.hinge)
+    if run.hinge >= user_hinges or not 0 <= run.on < len(scene.body):
         return False
     hinge = scene.hinge[run.hinge]
     return hinge.is_weld and not hinge.lets_go
 
 
-def _alone(body: Body, expanded: ExpandedScene) -> bool:
-    """Whether it is a rigid body, and nothing but that."""
+def _is_rigid(body: Body, expanded: ExpandedScene) -> bool:
+    """Whether a body is rigid, and no node of a flexible one."""
     return body.type == "rigid" and not expanded.is_node(body.name)
 
 
 def contract_tree(tree: Topology, carried: WeldedBodies) -> Topology:
-    """The tree without the bodies that others carry; the rest keeps its order."""
+    """Remove merged bodies from the tree; the others keep their order."""
     if not carried.by:
         return tree
     places, runs, count = {GROUND: GROUND}, list[BodyRow](), 0

@@ -112,7 +112,7 @@ def test_the_bodys_own_key_and_the_option_agree(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("level", "beam", "words"),
     [
-        ("elastic", {}, 'flexibility "elastic" is not known; there are: coupled, one-way, rigid'),
+        ("elastic", {}, 'flexibility: expected one of coupled, one-way, rigid, found "elastic"'),
         ("rigid", {"viscous_drag": 0.1}, 'beam "arm": viscous_drag needs model = "flexible"'),
     ],
 )

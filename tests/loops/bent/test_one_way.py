@@ -207,7 +207,7 @@ def test_the_end_that_holds_a_body_is_that_of_the_tree() -> None:
             False,
             'shape y. moves the end "root", where hin',
         ),
-        ({}, True, 'shape y. turns the end "tip", where hinge "wrist" closes a loop'),
+        ({}, True, 'shape y. rotates the end "tip", where hinge "wrist" closes a loop'),
     ],
 )
 def test_shapes_that_open_the_loop_are_refused(
