@@ -1,4 +1,4 @@
-"""The sweep as least squares as a way to the accelerations of a tree of rigid bodies."""
+"""Accelerations of a tree of rigid bodies by the QR sweep (least squares)."""
 
 from __future__ import annotations
 
@@ -16,40 +16,39 @@ if TYPE_CHECKING:
     from .packed_scene import PackedScene
     from .system import BodyNumbers
 
-#: Least eigenvalue of a mass matrix with ones on its diagonal that is not rounding.
+#: Eigenvalue of a mass matrix with unit diagonal below which it counts as negative.
 _NEGATIVE = -1e-11
 
 _UPPER = np.triu_indices(6)
 
 
 def enable_qr_sweep(packed: PackedScene) -> None:
-    """Let the packed scene use it.
+    """Use the QR sweep.
 
-    Raises SceneError for flexible bodies, whose modes it has no rows for, and for bodies with
-    negative moments of inertia, which no rows have.
+    Raises SceneError for closed loops, flexible bodies, and mass matrices that are indefinite.
     """
-    way_out = 'use sweep = "riccati"'
-    reject_loops(packed, 'sweep = "qr"', way_out)
+    remedy = 'use sweep = "riccati"'
+    reject_loops(packed, 'sweep = "qr"', remedy)
     if packed.flexible:
         name = next(iter(packed.flexible))
         raise SceneError(
-            f'"{name}" is flexible; sweep = "qr" is for rigid bodies only; {way_out}, '
+            f'"{name}": sweep = "qr" needs rigid bodies, found a flexible one; {remedy}, '
             'or flexibility = "rigid"'
         )
     for number, body in enumerate(packed.system.distinct):
-        if _least(_mass_matrix(packed, body)) < _NEGATIVE:
+        if _min_eigenvalue(_mass_matrix(packed, body)) < _NEGATIVE:
             place = int(np.argmax(packed.system.which == number))
             name = packed.scene.bodies.name(packed.topology.at(place)[0])
             raise SceneError(
-                f'body "{name}": its mass matrix is no sum of squares, as sweep = "qr" needs it (a '
-                "negative moment of inertia about some axis, or a mass centre too far away for its "
-                f"digits); mend the body, or {way_out}"
+                f'body "{name}": sweep = "qr" needs a positive semidefinite mass matrix, found a '
+                "negative eigenvalue (a negative moment of inertia about some axis, or a mass "
+                f"centre too far away for its digits); correct the body, or {remedy}"
             )
     packed.qr, packed.model.qr = True, 1
 
 
 def _mass_matrix(packed: PackedScene, body: BodyNumbers) -> Array:
-    """(6, 6) of a body alone, about its input end."""
+    """Mass matrix (6, 6) of a body about its input end."""
     ffi, upper = packed.ffi, np.zeros(21)
     call = ffi.cast(
         "int (*)(const double *, double *)", packed.elements[body.body].functions["inertia"]
@@ -60,8 +59,8 @@ def _mass_matrix(packed: PackedScene, body: BodyNumbers) -> Array:
     return np.asarray(matrix + np.triu(matrix, 1).T)
 
 
-def _least(matrix: Array) -> float:
-    """Least eigenvalue with rows and columns in units of their own."""
+def _min_eigenvalue(matrix: Array) -> float:
+    """Smallest eigenvalue of a matrix scaled to unit diagonal."""
     diagonal = np.diagonal(matrix)
     if diagonal.min() < 0:
         return float(diagonal.min())
@@ -70,10 +69,12 @@ def _least(matrix: Array) -> float:
 
 
 def reject_qr_steps(packed: PackedScene) -> None:
-    """SceneError for steps that are not made from accelerations: the tangent of an implicit method
-    and the classical matrices lose the digits again that this sweep keeps."""
+    """Raise SceneError for the QR sweep with steps that are not computed from accelerations.
+
+    Tangents of implicit methods and classical matrices would lose the digits that this sweep keeps.
+    """
     if packed.qr:
         raise SceneError(
-            'sweep = "qr" makes accelerations, which implicit and classical methods do not ask '
-            f'for; use {EXPLICIT_METHODS}, or sweep = "riccati"'
+            'sweep = "qr" gives accelerations only, which implicit and classical methods do not '
+            f'use; use {EXPLICIT_METHODS}, or sweep = "riccati"'
         )

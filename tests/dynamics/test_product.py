@@ -143,9 +143,9 @@ def test_accuracy_asked_for_is_kept_or_named() -> None:
 @pytest.mark.parametrize(
     ("kinds", "named"),
     [
-        (("pin", "ball"), 'hinge "hinge1".*ball behind type pin'),
-        (("ball", "pin"), 'hinge "hinge1".*pin behind type ball'),
-        (("elastic", "ball"), 'hinge "hinge1".*ball behind type elastic'),
+        (("pin", "ball"), 'hinge "hinge1".*ball outboard of type pin'),
+        (("ball", "pin"), 'hinge "hinge1".*pin outboard of type ball'),
+        (("elastic", "ball"), 'hinge "hinge1".*ball outboard of type elastic'),
         (("pin", "cylindrical"), 'hinge "hinge1".*cylindrical'),
         (("prismatic", "prismatic"), 'hinge "hinge0".*prismatic'),
         (("pin", "fixed", "pin"), 'hinge "hinge1".*fixed'),

@@ -197,7 +197,7 @@ def test_a_number_inside_an_expression_is_refused() -> None:
              "parameters": {"gain": 2.0}, "law": {"effort": "gain*sin(t)"}}  # fmt: skip
     rod = {"name": "rod", "mass": 1.0, "inertia": [0.1, 0.1, 0.1]}
     scene = mstmm.Scene(gravity=[0, 0, 0], body=[rod], hinge=[hinge])
-    with pytest.raises(SceneError, match="an effort of the hinge is written with it"):
+    with pytest.raises(SceneError, match="an effort expression of the hinge contains it"):
         parameter_derivatives(scene, {}, ["own.parameters.gain"])
 
 

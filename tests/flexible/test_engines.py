@@ -184,7 +184,7 @@ def test_derivatives_by_numbers(rng: Generator) -> None:
         wanted = (ahead - behind) / (2 * step)
         assert worst(found[name], wanted, floor=size) < 1e-6, name
     stiffness = f"{min(beams)}.bending_stiffness[0]"
-    with pytest.raises(SceneError, match="numbers of flexible bodies, and of loads along them"):
+    with pytest.raises(SceneError, match="numbers of flexible bodies and of loads along them"):
         model.derivatives(q, u, TIME, parameters=[stiffness])
 
 

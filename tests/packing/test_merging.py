@@ -151,7 +151,7 @@ def test_what_acts_on_a_part_acts_on_the_whole() -> None:
 
 
 def test_words_that_are_none_are_refused() -> None:
-    with pytest.raises(mstmm.SceneError, match="simplify: expected True.*; found 'weld'"):
+    with pytest.raises(mstmm.SceneError, match=r"simplify: expected True.*; found 'weld'"):
         mstmm.compile(arm(), simplify=["weld"])
     assert len(otherwise(mstmm.compile(arm(), simplify=["welds"]))) == 2
     for wrong in (None, 1, [["welds"]]):

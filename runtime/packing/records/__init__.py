@@ -1,1 +1,1 @@
-"""A System as the C records of the looped engine: written, never read."""
+"""C records of the looped engine, written from a System and never read back."""

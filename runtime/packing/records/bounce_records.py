@@ -1,4 +1,4 @@
-"""Events that bounce -> slopes of their values by time, coordinates and places."""
+"""Bounce events: derivatives of their event functions by time, coordinates and positions."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from mstmm.scene import Event, Scene
 from ..coordinate_layout import Layout
 from ..expression_tapes import condition_value, inputs_port, resolver, state_ports, values_kernel
 
-#: Numbers of an end among those that events read: its place, then its velocity.
-_NUMBERS, _PLACE = 6, 3
+#: Numbers of an end that events read: its position (3), then its velocity (3).
+_NUMBERS, _POSITION = 6, 3
 
 
 @dataclass(frozen=True)
 class Bounce:
-    """How event number `event` throws back.
+    """Bounce of event number `event`.
 
-    `slopes` is a tape like that of the events, which gives the slope of the value by time and by
-    each of `places`: (coordinate, speed), or (-1 - 3 number of the end - component, 0).
+    `slopes` is a tape with the inputs of the event tape: the derivative of the event function by
+    time and by each of `places`: (coordinate, speed), or (-1 - 3 number of the end - component, 0).
     """
 
     event: int
@@ -37,9 +37,9 @@ class Bounce:
 def build_bounces(
     scene: Scene, layout: Layout, probes: dict[tuple[str, str], int]
 ) -> tuple[Bounce, ...]:
-    """Bounces in the order of the events; `probes` are all ends whose places these read.
+    """Build the bounces in the order of the events; `probes` are all ends that these read.
 
-    Raises SceneError for conditions of speeds, and of coordinates whose rates are no speeds.
+    Raises SceneError for conditions on speeds, and on coordinates whose rates are not speeds.
     """
     return tuple(
         _bounce(scene, layout, probes, number, event)
@@ -57,36 +57,37 @@ def _bounce(
     for leaf in _leaves(value):
         assert isinstance(leaf.leaf, Element)
         if leaf.leaf.port in ("q", "u", "points"):
-            places.append(_place(layout, event, leaf.leaf))
+            places.append(_position_reference(layout, event, leaf.leaf))
             slopes.append(derivative(value, {leaf: 1}))
     if not places:
         raise SceneError(
-            f'event "{event.name}": its condition reads no place, so nothing bounces; name a '
-            "coordinate (pin.q) or a place (ball.y)"
+            f'event "{event.name}": do = "bounce" needs a condition on a coordinate (pin.q) or '
+            f"position (ball.y), found {event.when.text!r}"
         )
     ports = [*state_ports(layout), Port("points", (_NUMBERS * len(probes),)), inputs_port(layout)]
     kernel = values_kernel(graph, "bounce", ports, [derivative(value, {time: 1}), *slopes])
     return Bounce(number, event.restitution, compile_tape(kernel), tuple(places))
 
 
-def _place(layout: Layout, event: Event, leaf: Element) -> tuple[int, int]:
+def _position_reference(layout: Layout, event: Event, leaf: Element) -> tuple[int, int]:
+    """Entry of `Bounce.places` for an input of the event function."""
     index = int(leaf.index[0])
-    if leaf.port == "points" and index % _NUMBERS < _PLACE:
-        return -1 - _PLACE * (index // _NUMBERS) - index % _NUMBERS, 0
+    if leaf.port == "points" and index % _NUMBERS < _POSITION:
+        return -1 - _POSITION * (index // _NUMBERS) - index % _NUMBERS, 0
     if leaf.port == "q":
-        bent = {one.q for one in layout.modal.values()}
+        modal = {slots.q for slots in layout.modal.values()}
         for slots in layout.owners:
-            if slots.q <= index < slots.q + slots.nq and slots.straight and slots.q not in bent:
+            if slots.q <= index < slots.q + slots.nq and slots.straight and slots.q not in modal:
                 return index, slots.u + index - slots.q
     raise SceneError(
-        f'event "{event.name}": do = "bounce" strikes places, coordinates of hinges whose rates '
-        f"are speeds among them, found {event.when.text!r}; write a condition of places such as "
-        "ball.y <= 0.1"
+        f'event "{event.name}": do = "bounce" needs a condition on positions, or on hinge '
+        f"coordinates whose rates are speeds, found {event.when.text!r}; write a condition on "
+        "positions such as ball.y <= 0.1"
     )
 
 
 def _leaves(value: Node) -> Iterator[Node]:
-    """Entries of arrays that a value is made of, each once."""
+    """Array elements that a value depends on, without duplicates."""
     seen, stack = set[int](), [value]
     while stack:
         node = stack.pop()

@@ -1,4 +1,4 @@
-"""Couplings -> C records."""
+"""C records of couplings."""
 
 from __future__ import annotations
 
@@ -13,8 +13,14 @@ from .memory import Memory
 
 @dataclass(frozen=True)
 class WrittenCoupling:
-    """A coupling, its row (-1: none), where its numbers begin behind those of all loops, and where
-    -C of each of its hinges, by the hinge's place."""
+    """Coupling in the records.
+
+    Attributes:
+        coupling: its numbers.
+        row: its constraint row, -1 without one.
+        numbers: offset of its numbers in those of all loops.
+        columns: hinge, by position in the tree -> offset of its -C.
+    """
 
     coupling: CouplingNumbers
     row: int
@@ -25,21 +31,24 @@ class WrittenCoupling:
 def place_couplings(
     model: Any, system: System, rows: Sequence[int], take: Callable[[int], int]
 ) -> tuple[WrittenCoupling, ...]:
-    """Rows and places of couplings, whose numbers one tape writes; `rows` are those of the ones
-    that have one, `take` gives room for numbers that are no sums."""
+    """Assign rows and offsets to the couplings, whose numbers are the output of one tape.
+
+    `rows` are the rows of the couplings that have one; `take` reserves numbers.
+    """
     if system.coupled is None:
         return ()
     model.coupling_numbers = take(system.coupled.outputs[0].length())
-    left, found = iter(rows), []
-    own = int(prebuilt_kernels.module()[1].MSTMM_COUPLING)
-    for one in system.couplings:
-        first, columns = int(model.coupling_numbers) + one.first, dict[int, int]()
-        at = first + own
-        for hinge in one.hinges:
-            columns[hinge.place] = at
-            at += system.body(hinge.place).nu
-        found.append(WrittenCoupling(one, -1 if one.repeats else next(left), first, columns))
-    return tuple(found)
+    next_row, written = iter(rows), []
+    header_length = int(prebuilt_kernels.module()[1].MSTMM_COUPLING)
+    for coupling in system.couplings:
+        first, columns = int(model.coupling_numbers) + coupling.first, dict[int, int]()
+        column = first + header_length
+        for hinge in coupling.hinges:
+            columns[hinge.place] = column
+            column += system.body(hinge.place).nu
+        row = -1 if coupling.repeats else next(next_row)
+        written.append(WrittenCoupling(coupling, row, first, columns))
+    return tuple(written)
 
 
 def attach_couplings(
@@ -51,23 +60,25 @@ def attach_couplings(
     looped: Any,
     side: Callable[[int, int], int],
 ) -> None:
-    """Give the model its couplings, and hinges that close loops those of their own speeds; `side`
-    is the place of a row's column on a body."""
+    """Write the couplings to the model, and to cut hinges the couplings of their own speeds.
+
+    `side` gives the offset of a row's column on a body.
+    """
     records = memory.new("mstmm_coupling[]", max(1, len(couplings)))
     own: dict[int, list[tuple[int, int, int, int]]] = {}
-    frames = {one.frame for one in system.closures}
-    for record, one in zip(records, couplings, strict=False):
-        kept = one.coupling.kept
-        record.row, record.numbers = one.row, one.numbers
+    frames = {closure.frame for closure in system.closures}
+    for record, written in zip(records, couplings, strict=False):
+        row, kept = written.row, written.coupling.kept
+        record.row, record.numbers = row, written.numbers
         record.kept = 0.0 if kept is None else kept
-        record.of_speeds = int(one.coupling.of_speeds or kept is None)
-        if one.row >= 0:
-            rows[one.row].of_speeds = record.of_speeds
-        for hinge in one.coupling.hinges:
-            if hinge.place in frames and one.row >= 0:
-                sides = side(hinge.inboard, one.row), side(hinge.outboard, one.row)
-                own.setdefault(hinge.place, []).append((one.row, *sides, one.columns[hinge.place]))
-    for frame, found in own.items():
-        looped[frame].n_own, looped[frame].own = len(found), memory.new("mstmm_own[]", found)
+        record.of_speeds = int(written.coupling.of_speeds or kept is None)
+        if row >= 0:
+            rows[row].of_speeds = record.of_speeds
+        for hinge in written.coupling.hinges:
+            if hinge.place in frames and row >= 0:
+                sides = side(hinge.inboard, row), side(hinge.outboard, row)
+                own.setdefault(hinge.place, []).append((row, *sides, written.columns[hinge.place]))
+    for frame, entries in own.items():
+        looped[frame].n_own, looped[frame].own = len(entries), memory.new("mstmm_own[]", entries)
     model.couplings, model.n_couplings = records, len(couplings)
     model.coupling_tape = memory.expression(system.coupled)

@@ -1,4 +1,4 @@
-"""Derivatives of a scene's expressions -> tapes in its records, made when they are first wanted."""
+"""Tapes of the derivatives of a scene's expressions, compiled on first use."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from mstmm.ir.tape import compile_tape
 from ...kernels.tape_kernel import c_tape
 from ..system import System
 
-#: Held while tapes are made: two threads may ask at once.
+#: Guards the compilation of tapes, which several threads may request.
 LOCK = threading.Lock()
 
 
 @dataclass
 class Slopes:
-    """Tapes of derivatives: the largest workspace of one, and what keeps them."""
+    """Tapes of derivatives: their largest workspace, and references that keep them alive."""
 
     slots: int = 0
     kept: list[Any] = field(default_factory=list)
 
 
 def write_slopes(system: System, model: Any, ffi: Any) -> Slopes:
-    """Give `model` the tapes of drives, values, couplings and given efforts of springs."""
-    made = Slopes()
+    """Write derivative tapes of drives, values, couplings and spring efforts to `model`."""
+    slopes = Slopes()
 
     def tape(kernel: KernelIR | None) -> Any:
         if kernel is None:
             return ffi.NULL
         ports = [port.name for port in kernel.inputs if port.name != INPUTS]
         slope = compile_tape(differentiate(kernel, ports, values=False, guards=False))
-        made.slots = max(made.slots, slope.slots)
-        return c_tape(ffi, slope, made.kept)
+        slopes.slots = max(slopes.slots, slope.slots)
+        return c_tape(ffi, slope, slopes.kept)
 
     model.drive_slopes, model.value_slopes = tape(system.drives), tape(system.values)
     model.coupling_slopes = tape(system.coupled)
     for k, force in enumerate(system.forces):
         model.forces[k].effort_slope = tape(force.effort)
-    return made
+    return slopes

@@ -1,4 +1,4 @@
-"""Laws -> C records: those of a pattern filled once, and copied."""
+"""C records of hinge laws; those of a pattern are filled once and copied."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .memory import Memory
 
 
 class LawRecords:
-    """The records of a system's laws, run by run."""
+    """Records of a system's laws, run by run."""
 
     def __init__(self, system: System, memory: Memory) -> None:
         self.memory, self.functions = memory, prebuilt_kernels.element("sweep", "laws").functions
@@ -21,13 +21,13 @@ class LawRecords:
         memory.kept.append(self.records)
         first = 0
         for run in system.laws:
-            self._run(run, first)
+            self._fill_run(run, first)
             first += run.count
 
-    def _run(self, run: LawRun, first: int) -> None:
+    def _fill_run(self, run: LawRun, first: int) -> None:
         if run.count == len(run.pattern):
-            for place, (law, body, twist, efforts) in enumerate(run.each(), first):
-                record = self.records.array[place]
+            for number, (law, body, twist, efforts) in enumerate(run.each(), first):
+                record = self.records.array[number]
                 self._fill(record, law)
                 record.body, record.twist = body, twist
                 record.effort = self.memory.ints(efforts)
@@ -35,24 +35,24 @@ class LawRecords:
         prototypes = CRecords(self.memory.ffi, "mstmm_law", len(run.pattern))
         for record, law in zip(prototypes.array, run.pattern, strict=True):
             self._fill(record, law)
-        places = slice(first, first + run.count)
-        repeats, which = np.divmod(np.arange(run.count), len(run.pattern))
-        self.records.copy(places, prototypes, which)
-        member = np.array([law.member for law in run.pattern])[which]
-        turn = np.array([law.turn for law in run.pattern])[which]
+        numbers = slice(first, first + run.count)
+        repeats, k_in_pattern = np.divmod(np.arange(run.count), len(run.pattern))
+        self.records.copy(numbers, prototypes, k_in_pattern)
+        member = np.array([law.member for law in run.pattern])[k_in_pattern]
+        turn = np.array([law.turn for law in run.pattern])[k_in_pattern]
         column = self.records.column
-        column("body")[places] = run.place + repeats * run.period + member
-        column("twist")[places] = np.where(turn < 0, -1, run.twist + repeats * run.turns + turn)
+        column("body")[numbers] = run.place + repeats * run.period + member
+        column("twist")[numbers] = np.where(turn < 0, -1, run.twist + repeats * run.turns + turn)
         for k, law in enumerate(run.pattern):
-            own = column("effort")[places][k :: len(run.pattern)]
-            rows = np.array(law.efforts, dtype=np.int32)
-            self.memory.kept.append(rows)
-            own[:] = rows.ctypes.data
-            if len(rows) > 1:
-                own += rows.strides[0] * np.arange(len(own), dtype=own.dtype)
+            pointers = column("effort")[numbers][k :: len(run.pattern)]
+            efforts = np.array(law.efforts, dtype=np.int32)
+            self.memory.kept.append(efforts)
+            pointers[:] = efforts.ctypes.data
+            if len(efforts) > 1:
+                pointers += efforts.strides[0] * np.arange(len(pointers), dtype=pointers.dtype)
 
     def _fill(self, record: Any, law: LawNumbers) -> None:
-        """What the laws of a pattern share."""
+        """Fill the fields that all repeats of a law share."""
         record.kind, record.evaluate = int(law.turn >= 0), self.functions[law.kernel]
         record.evaluate_slope = self.functions[f"{law.kernel}_slope"]
         record.coordinate, record.speed, record.n = law.coordinate, law.speed, law.n

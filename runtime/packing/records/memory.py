@@ -13,53 +13,57 @@ from mstmm.ir.tape import Tape, compile_tape
 
 from ...kernels.tape_kernel import c_tape
 
-#: Numbers side by side: a sweep over many bodies meets them in this order.
-_ROOM = 4096
+#: Length of the blocks that hold small arrays side by side, in the order in which a sweep over many
+#: bodies reads them.
+_BLOCK_LENGTH = 4096
 
 
 class Memory:
-    """Makes arrays, tapes and records of C; `kept` keeps them, `slots` is what a tape needs."""
+    """Allocator of C arrays, tapes and records.
+
+    `kept` are the references that keep them alive, `slots` is the largest workspace of a tape.
+    """
 
     def __init__(self, ffi: Any) -> None:
         self.ffi, self.slots = ffi, 0
         self.kept: list[Any] = []
-        #: C type -> a room, and how many of its numbers are taken.
-        self._rooms: dict[str, tuple[Any, int]] = {}
+        #: C type -> current block, and the length used.
+        self._blocks: dict[str, tuple[Any, int]] = {}
 
     def new(self, kind: str, given: Any = None) -> Any:
-        """A new record, or an array of them."""
-        made = self.ffi.new(kind) if given is None else self.ffi.new(kind, given)
-        self.kept.append(made)
-        return made
+        """Allocate a record or an array of them."""
+        data = self.ffi.new(kind) if given is None else self.ffi.new(kind, given)
+        self.kept.append(data)
+        return data
 
     def reals(self, numbers: Sequence[float]) -> Any:
-        """`real *` to numbers of their own, next to those asked for before."""
-        return self._placed("real", list(numbers) or [0.0])
+        """Pointer `real *` to a copy of the numbers, stored after those of the last call."""
+        return self._store("real", list(numbers) or [0.0])
 
     def ints(self, numbers: Sequence[int]) -> Any:
-        """`int *` to numbers of their own, next to those asked for before."""
-        return self._placed("int", list(numbers) or [0])
+        """Pointer `int *` to a copy of the numbers, stored after those of the last call."""
+        return self._store("int", list(numbers) or [0])
 
-    def _placed(self, kind: str, numbers: list[Any]) -> Any:
+    def _store(self, kind: str, numbers: list[Any]) -> Any:
         count = len(numbers)
-        room, taken = self._rooms.get(kind, (None, _ROOM))
-        if taken + count > _ROOM:
-            room, taken = self.new(f"{kind}[]", max(_ROOM, count)), 0
-        room[taken : taken + count] = numbers
-        self._rooms[kind] = room, taken + count
-        return room + taken
+        block, used = self._blocks.get(kind, (None, _BLOCK_LENGTH))
+        if used + count > _BLOCK_LENGTH:
+            block, used = self.new(f"{kind}[]", max(_BLOCK_LENGTH, count)), 0
+        block[used : used + count] = numbers
+        self._blocks[kind] = block, used + count
+        return block + used
 
     def array(self, numbers: Array) -> Any:
-        """`real *` to the numbers of an array, row by row."""
+        """Pointer `real *` to the entries of an array, row by row."""
         flat = np.ascontiguousarray(np.ravel(numbers) if np.size(numbers) else [0.0], dtype=float)
         self.kept.append(flat)
         return self.ffi.from_buffer("real[]", flat)
 
     def tape(self, tape: Tape) -> Any:
-        """`mstmm_tape *`."""
+        """Pointer `mstmm_tape *` to a copy of the tape."""
         self.slots = max(self.slots, tape.slots)
         return c_tape(self.ffi, tape, self.kept)
 
     def expression(self, kernel: KernelIR | None) -> Any:
-        """The tape of a kernel of expressions, NULL where there is none."""
+        """Tape of a kernel of expressions; NULL without one."""
         return self.ffi.NULL if kernel is None else self.tape(compile_tape(kernel))

@@ -1,4 +1,4 @@
-"""Flexible bodies and their sections -> C records."""
+"""C records of flexible bodies and their sections."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ _AXES, _PAIRS = "xyz", ("xx", "xy", "xz", "yy", "yz", "zz")
 
 
 class ModalRecords:
-    """Makes `mstmm_modal` and `mstmm_section`.
+    """Records `mstmm_modal` and `mstmm_section`.
 
-    `size` counts the workspace that they need, from `begin` on; by the places of the bodies,
-    `modal` and `sections` say where the numbers of each begin in it.
+    Attributes:
+        size: length of their workspace.
+        modal, sections: body, by position in the tree -> offset of its numbers in the workspace.
     """
 
     def __init__(self, memory: Memory, lib: Any) -> None:
@@ -25,7 +26,7 @@ class ModalRecords:
         self._sections: dict[int, Any] = {}
 
     def add_modal(self, place: int, modal: ModalNumbers) -> Any:
-        """`mstmm_modal *` of the body at a place of the tree."""
+        """Create the `mstmm_modal *` of the body at position `place` in the tree."""
         record, array = self.memory.new("mstmm_modal *"), self.memory.array
         record.n, record.q, record.u = modal.n, modal.q, modal.u
         self._moments(record.moments, modal.moments)
@@ -34,12 +35,12 @@ class ModalRecords:
             self._moments(record.drag, modal.drag)
         for name, matrix in modal.matrices.named.items():
             setattr(record, name, array(matrix))
-        self.modal[place] = self._room(self.lib.mstmm_modal_numbers(modal.n))
+        self.modal[place] = self._reserve(self.lib.mstmm_modal_numbers(modal.n))
         self._modal[place] = record
         return record
 
     def add_section(self, place: int, section: SectionNumbers) -> Any:
-        """`mstmm_section *` that the connection of a body passes."""
+        """Create the `mstmm_section *` in the connection of the body at position `place`."""
         record, array = self.memory.new("mstmm_section *"), self.memory.array
         modal = self._modal[section.frame]
         record.modal, record.inward = modal, int(section.inward)
@@ -49,16 +50,16 @@ class ModalRecords:
         for k, axis in enumerate(_AXES):
             record.drawn[k] = array(inputs[f"g_{axis}"])
             record.turned[k] = array(inputs[f"h_{axis}"])
-        self.sections[place] = self._room(self.lib.mstmm_section_numbers(modal.n))
+        self.sections[place] = self._reserve(self.lib.mstmm_section_numbers(modal.n))
         self._sections[place] = record
         return record
 
     def begin(self, first: int) -> int:
-        """Put all numbers behind `first` of the workspace; returns the place behind them."""
-        for places, records in ((self.modal, self._modal), (self.sections, self._sections)):
+        """Shift all offsets to begin at `first`; returns the offset behind the numbers."""
+        for offsets, records in ((self.modal, self._modal), (self.sections, self._sections)):
             for place, record in records.items():
-                places[place] += first
-                record.place = places[place]
+                offsets[place] += first
+                record.place = offsets[place]
         return first + self.size
 
     def _moments(self, record: Any, moments: Arrays) -> None:
@@ -72,7 +73,7 @@ class ModalRecords:
             record.g[k] = array(named[f"G_{axis}"])
         record.m = array(named["M"])
 
-    def _room(self, count: int) -> int:
+    def _reserve(self, count: int) -> int:
         first = self.size
         self.size += int(count)
         return first

@@ -1,4 +1,4 @@
-"""System -> `mstmm_model`."""
+"""C record `mstmm_model` of a system."""
 
 from __future__ import annotations
 
@@ -24,11 +24,16 @@ from .planar_records import attach_planar_bodies
 
 @dataclass(frozen=True)
 class Written:
-    """A system in the memory of C, which `kept` keeps.
+    """Model record with its memory, and the layout of the workspace.
 
-    Of the workspace `blocks`, `modal` and `sections` say where the numbers of bodies, flexible
-    bodies and sections begin, by places in the tree; `scratch` is behind them, where tapes need
-    `slots`.
+    Attributes:
+        kept: references that keep the memory of the records alive.
+        blocks, modal, sections: offsets of the numbers of bodies, flexible bodies and sections, by
+            position in the tree.
+        scratch: offset behind them.
+        slots: largest workspace of a tape.
+        reach: dependence of the loads on the motion of bodies.
+        loops: records of the closed loops, None without any.
     """
 
     model: Any
@@ -43,7 +48,7 @@ class Written:
 
 
 def write_model(system: System, elements: Elements) -> Written:
-    """The records of a system."""
+    """Write the records of a system."""
     ffi, lib = prebuilt_kernels.module()
     memory = Memory(ffi)
     model = memory.new("mstmm_model *")
@@ -65,14 +70,14 @@ def write_model(system: System, elements: Elements) -> Written:
     for place in reach.placed:
         bodies.records.array[place].placed = 1
     loads = memory.new("mstmm_load[]", max(1, len(system.loads)))
-    for record, load, own in zip(loads, system.loads, reach.loads, strict=False):
-        _load(record, load)
-        record.own = int(own)
+    for record, load, is_own in zip(loads, system.loads, reach.loads, strict=False):
+        _fill_load(record, load)
+        record.own = int(is_own)
     model.loads, model.n_loads = loads, len(system.loads)
     forces = memory.new("mstmm_force[]", max(1, len(system.forces)))
-    for record, force, own in zip(forces, system.forces, reach.forces, strict=False):
-        _force(record, force, elements, memory)
-        record.own = int(own)
+    for record, force, is_own in zip(forces, system.forces, reach.forces, strict=False):
+        _fill_force(record, force, elements, memory)
+        record.own = int(is_own)
     model.forces, model.n_forces = forces, len(system.forces)
     model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
@@ -100,25 +105,26 @@ def write_model(system: System, elements: Elements) -> Written:
 
 
 def write_inputs(inputs: Sequence[PiecewisePolynomial], held: Sequence[int], memory: Memory) -> Any:
-    """`mstmm_input[]` of inputs and signals: over time, or where they are held."""
+    """Write `mstmm_input[]` of inputs and signals; `held` are their indices in memory, or -1."""
     records = memory.new("mstmm_input[]", max(1, len(inputs)))
     written: dict[int, tuple[Any, Any]] = {}  # many trajectories may share a long signal
-    for record, one, place in zip(records, inputs, held, strict=False):
-        if id(one) not in written:
-            numbers = [x for piece in one.pieces for x in piece]
-            written[id(one)] = memory.reals(one.knots), memory.reals(numbers)
-        record.n_knots, (record.knots, record.numbers) = len(one.knots), written[id(one)]
-        record.held = place
+    for record, channel, index in zip(records, inputs, held, strict=False):
+        if id(channel) not in written:
+            numbers = [x for piece in channel.pieces for x in piece]
+            written[id(channel)] = memory.reals(channel.knots), memory.reals(numbers)
+        record.n_knots = len(channel.knots)
+        record.knots, record.numbers = written[id(channel)]
+        record.held = index
     return records
 
 
-def _load(record: Any, load: LoadNumbers) -> None:
+def _fill_load(record: Any, load: LoadNumbers) -> None:
     record.body, record.offset = load.body, list(load.offset)
     record.axes, record.axes_own = load.axes, list(load.axes_own)
     record.force, record.moment = list(load.force), list(load.moment)
 
 
-def _force(record: Any, force: ForceNumbers, elements: Elements, memory: Memory) -> None:
+def _fill_force(record: Any, force: ForceNumbers, elements: Elements, memory: Memory) -> None:
     for letter, (body, axes, offset) in zip("ft", force.ends, strict=True):
         setattr(record, f"body_{letter}", body)
         setattr(record, f"axes_{letter}", list(axes))

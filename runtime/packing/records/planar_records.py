@@ -1,4 +1,4 @@
-"""Bodies of a scene in a plane -> C records, and room for their numbers."""
+"""C records of the bodies of a planar mechanism."""
 
 from __future__ import annotations
 
@@ -30,17 +30,19 @@ def attach_planar_bodies(
     axes: Array,
     place: int,
 ) -> int:
-    """Give the model the bodies of a plane with these axes (3, 3) and a place for their numbers in
-    the workspace; returns the place behind them.  `looped` are the records of their closed loops.
+    """Write the bodies of a planar mechanism, and reserve workspace for them at offset `place`.
+
+    `axes` (3, 3) are those of the plane, `looped` the records of the closed loops by body.
+    Returns the offset behind the numbers.
     """
-    distinct, shared = list(_in_axes(system, axes)), dict[Numbers, Any]()
+    distinct, shared = list(_bodies_in_plane(system, axes)), dict[Numbers, Any]()
     floors = _Floors(elements, memory.ffi)
     prototypes = CRecords(memory.ffi, "mstmm_flat_body", len(distinct))
     for record, body in zip(prototypes.array, distinct, strict=False):
-        given = _given(body, floors.of(body))
-        if given not in shared:
-            shared[given] = memory.reals(given)
-        record.given = shared[given]
+        numbers = _planar_numbers(body, floors.inertia_floor(body))
+        if numbers not in shared:
+            shared[numbers] = memory.reals(numbers)
+        record.given = shared[numbers]
         record.idle = record.aside = int(body.idle)
     records = CRecords(memory.ffi, "mstmm_flat_body", system.count)
     records.copy(slice(None), prototypes, system.which)
@@ -56,37 +58,36 @@ def attach_planar_bodies(
     return place + int(lib.MSTMM_FLAT) * (1 + system.count)
 
 
-def _in_axes(system: System, axes: Array) -> Iterator[BodyNumbers]:
-    """Every body that differs from others, told in the axes of the plane where it stands on the
-    ground."""
+def _bodies_in_plane(system: System, axes: Array) -> Iterator[BodyNumbers]:
+    """Distinct bodies, with connections to the ground in the axes of the plane."""
     for run in system.bodies:
         for k, body in enumerate(run.alike):
             if k or run.parent != GROUND:
                 yield body
                 continue
-            turned = axes.T @ np.reshape(body.connection[:9], (3, 3))
+            rotation = axes.T @ np.reshape(body.connection[:9], (3, 3))
             shift = axes.T @ body.connection[9:12]
-            yield replace(body, connection=(*turned.ravel().tolist(), *shift.tolist()))
+            yield replace(body, connection=(*rotation.ravel().tolist(), *shift.tolist()))
 
 
-def _given(body: BodyNumbers, floor: float) -> Numbers:
+def _planar_numbers(body: BodyNumbers, floor: float) -> Numbers:
     """Numbers of MSTMM_GIVEN, in their order."""
-    rotation, mass = body.connection, body.body_p
-    turned, shift = (rotation[0], rotation[3]), rotation[9:12]
-    return (*turned, *shift, body.rotor[0], floor, *mass[:3], mass[9])
+    connection, mass = body.connection, body.body_p
+    rotation, shift = (connection[0], connection[3]), connection[9:12]
+    return (*rotation, *shift, body.rotor[0], floor, *mass[:3], mass[9])
 
 
 class _Floors:
-    """Least moments of inertia of bodies that are not rounding."""
+    """Moments of inertia of bodies below which they count as rounding."""
 
     def __init__(self, elements: Elements, ffi: Any) -> None:
         kind = "int (*)(const double *, double *)"
-        self.mass, self.found = ffi.new("double[21]"), ffi.new("double[2]")
+        self.mass, self.floors = ffi.new("double[21]"), ffi.new("double[2]")
         self.inertia = ffi.cast(kind, elements["body", RIGID].functions["inertia"])
         self.floor = ffi.cast(kind, elements["sweep", "frames"].functions["pivot_floor"])
 
-    def of(self, body: BodyNumbers) -> float:
-        """About any axis of the body."""
+    def inertia_floor(self, body: BodyNumbers) -> float:
+        """Floor of the moments of inertia about any axis of a body, kg m^2."""
         self.inertia(list(body.body_p), self.mass)
-        self.floor(self.mass, self.found)
-        return float(self.found[1])
+        self.floor(self.mass, self.floors)
+        return float(self.floors[1])

@@ -1,4 +1,4 @@
-"""Rotors given to hinges for a while, to see what then moves."""
+"""Temporary rotors on hinges, to find out which motions are possible."""
 
 from __future__ import annotations
 
@@ -11,8 +11,11 @@ from .model_record import Written
 
 @contextmanager
 def trial_rotors(written: Written) -> Iterator[Callable[[int], None]]:
-    """Lets rotors of 1 kg m^2 be given to the hinges at places of the tree; all of them are taken
-    away again.  Links know no rotors, so that the sweep goes body by body meanwhile."""
+    """Context in which hinges, by position in the tree, can be given rotors of 1 kg m^2.
+
+    All rotors are removed at its end.  Links do not support them, so the sweep then goes body by
+    body.
+    """
     ffi, _ = prebuilt_kernels.module()
     rotor = ffi.new("real[]", [1.0] * 6)
     before: dict[int, tuple[object, int]] = {}
