@@ -1,4 +1,4 @@
-"""The elements that a scene names: prebuilt ones and those of the user's."""
+"""Elements that a scene uses: prebuilt and user-defined ones."""
 
 from __future__ import annotations
 
@@ -14,47 +14,47 @@ from ..kernels.prebuilt_kernels import Element
 
 Known = Mapping[Key, Element]
 
-#: The type that a weld runs as which lets go later: it is held until then.
+#: Type that runs a weld which may be released; its speeds are prescribed until then.
 LETS_GO = "free"
 
 
 def kernel_type(hinge: Hinge, releases: Mapping[str, int]) -> str:
-    """Name of the element whose kernels move a hinge."""
+    """Name of the element whose kernels compute the motion of a hinge."""
     if hinge.is_weld and hinge.name in releases:
         return LETS_GO
     return hinge.type if hinge.facts is None else hinge.facts.runs_as
 
 
 class Elements:
-    """Prebuilt elements and those of the user's, by kind and name."""
+    """Prebuilt and user-defined elements, by kind and name."""
 
     def __init__(self, known: Known) -> None:
         self.known = known
 
     def __getitem__(self, key: Key) -> Element:
-        """KeyError if nobody defines it."""
+        """Element with this key; KeyError if it is not defined."""
         return self.known[key] if key in self.known else prebuilt_kernels.elements()[key]
 
     def __contains__(self, key: Key) -> bool:
         return key in self.known or key in prebuilt_kernels.elements()
 
     def get(self, kind: str, name: str, user: str) -> Element:
-        """The element that `user` names as its type; SceneError if nobody defines it."""
+        """Element that the part `user` names as its type; SceneError if it is not defined."""
         try:
             return self[kind, name]
         except KeyError:
             raise SceneError(
-                f'scene: {kind} "{user}": type: nothing is known of the type "{name}"; '
-                f"generate it with: mstmm generate FILE, or mstmm list shows what there is"
+                f'scene: {kind} "{user}": type: unknown type "{name}"; generate it with: '
+                "mstmm generate FILE, or use one of: mstmm list"
             ) from None
 
 
 def declared_numbers(
     declared: Sequence[Param], given: Mapping[str, float], where: str
 ) -> tuple[float, ...]:
-    """Numbers of declared parameters in their order, defaults filled in.
+    """Values of declared parameters in their order, with defaults.
 
-    Raises SceneError naming the scene's element (`where`) for what is missing or out of bounds.
+    Raises SceneError with the name of the element (`where`) for missing or invalid values.
     """
     numbers = []
     for p in declared:

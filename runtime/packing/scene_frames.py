@@ -1,4 +1,4 @@
-"""Where everything of a scene lies: in the tree, in q and u, and in internal frames."""
+"""Positions of all parts of a scene: in the tree, in q and u, and in internal frames."""
 
 from __future__ import annotations
 
@@ -19,12 +19,19 @@ from .scene_elements import Elements
 
 @dataclass
 class Frames:
-    """A scene of nodes with its tree, layout and internal frames, and what its types stand for.
+    """Scene of nodes with its tree, layout, internal frames and elements.
 
-    `positions` and `hinge_position` are places in the tree, `releases` places in memory.
+    Attributes:
+        scene: of nodes, which replace the flexible bodies.
+        releases: hinge that may be released -> index in memory.
+        placements: body -> internal frame.
+        positions: body -> position in the tree.
+        hinge_position: hinge -> position of its outboard body in the tree.
+        simplified: simplifications done.
+        simplify: simplifications requested.
     """
 
-    scene: Scene  #: of nodes: flexible bodies are replaced by theirs
+    scene: Scene
     topology: Topology
     layout: Layout
     elements: Elements
@@ -33,39 +40,39 @@ class Frames:
     positions: Mapping[str, int]
     hinge_position: Mapping[str, int]
     expanded: ExpandedScene
-    simplified: tuple[Simplification, ...]  #: what is packed otherwise than it is described
-    simplify: Words  #: what was to be
+    simplified: tuple[Simplification, ...]
+    simplify: Words
 
     @property
     def described(self) -> Scene:
-        """The scene as the user describes it."""
+        """Scene as the user wrote it."""
         return self.expanded.described
 
     @property
     def flexible(self) -> Mapping[str, ModalBody]:
-        """Numbers of the flexible bodies."""
+        """Flexible bodies of the run by name."""
         return self.expanded.bodies
 
     @property
     def modal(self) -> Mapping[str, ModalBody]:
-        """Numbers of the flexible bodies, and of those that respond one way."""
+        """Flexible bodies of the run, and one-way coupled ones, by name."""
         rigidified = self.expanded.rigidified
         return {**self.flexible, **(rigidified.one_way if rigidified else {})}
 
     def mass_center(self, name: str) -> tuple[float, ...]:
-        """(3) mass centre of a body of the scene, internal axes, m."""
+        """Mass centre (3,) of a body in internal axes, m."""
         return self.placements[name].point(self.scene.bodies.by_name[name].center_of_mass)
 
     def end(self, reference: str) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
-        """(body position, axes (9), offset (3)) of "body" or "body.end", internal axes."""
-        name, at = split_reference(self.expanded.nodes.get(reference, reference))
+        """End "body.end" or origin "body": (position in the tree, axes (9), offset (3) in m)."""
+        name, end = split_reference(self.expanded.nodes.get(reference, reference))
         if name == "ground":
             return GROUND, (1, 0, 0, 0, 1, 0, 0, 0, 1), (0.0, 0.0, 0.0)
-        place = self.placements[name]
+        placement = self.placements[name]
         body = self.scene.bodies.by_name[name]
-        axes = place.axes(body.end_rotation(at))
+        axes = placement.axes(body.end_rotation(end))
         return (
             self.positions[name],
             (*axes[0], *axes[1], *axes[2]),
-            place.point(body.end_position(at)),
+            placement.point(body.end_position(end)),
         )

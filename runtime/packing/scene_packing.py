@@ -1,4 +1,4 @@
-"""Scene -> System -> records of the looped engine."""
+"""Packing of a scene: its system and the records of the looped engine."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ def pack(
     flexible: Mapping[str, ModalBody] | None = None,
     simplify: Words = LINKED,
 ) -> PackedScene:
-    """Engine arrays of a scene; as `system_of`.
+    """Pack a scene; arguments as in `system_of`.
 
-    With `product_accuracy` accelerations come from the plain product of classical matrices, which
-    may deviate from the Riccati sweep by that much; where `sweep` is "qr" they come from the QR
-    sweep, and where it is "refined" from the Riccati sweep, refined once.
+    With `product_accuracy` accelerations come from the product of classical matrices, which may
+    deviate from the Riccati sweep by at most that.  With `sweep` "qr" they come from the QR sweep,
+    with "refined" from the Riccati sweep with one refinement.
     """
     system, frames = system_of(scene, known, align=align, flexible=flexible, simplify=simplify)
     packed = packed_system(system, frames)
-    if product_accuracy is not None and not system.closes:  # closed loops go first
+    if product_accuracy is not None and not system.closes:  # with loops, it follows their analysis
         product_sweep.enable_product_sweep(packed, product_accuracy)
     if sweep == "qr":
         qr_sweep.enable_qr_sweep(packed)
@@ -48,43 +48,44 @@ def pack(
 
 
 def without_merging(packed: PackedScene) -> PackedScene:
-    """The same with every body by itself, under the same inputs; states and memory are the same."""
-    if not any(one.kind == WELDS for one in packed.simplified):
+    """Pack again without merging welded bodies; inputs, state and memory are the same."""
+    if not any(record.kind == WELDS for record in packed.simplified):
         return packed
-    words = {word: given for word, given in packed.simplify.items() if word != WELDS}
+    simplify = {kind: value for kind, value in packed.simplify.items() if kind != WELDS}
     system, frames = system_of(
-        packed.described, packed.elements.known, flexible=packed.modal, simplify=words
+        packed.described, packed.elements.known, flexible=packed.modal, simplify=simplify
     )
-    now = packed.system
-    both = zip(system.couplings, now.couplings, strict=True)
-    couplings = tuple(replace(one, kept=had.kept, repeats=had.repeats) for one, had in both)
+    current = packed.system
+    couplings = tuple(
+        replace(coupling, kept=other.kept, repeats=other.repeats)
+        for coupling, other in zip(system.couplings, current.couplings, strict=True)
+    )
     closures = tuple(
-        replace(one, directions=known.directions, choice=known.choice)
-        for one, known in zip(system.closures, now.closures, strict=True)
+        replace(closure, directions=other.directions, choice=other.choice)
+        for closure, other in zip(system.closures, current.closures, strict=True)
     )
-    same = replace(
-        system, inputs=now.inputs, held=now.held, by_time=now.by_time, n_memory=now.n_memory,
-        couplings=couplings,
-        closures=closures,
+    system = replace(
+        system, inputs=current.inputs, held=current.held, by_time=current.by_time,
+        n_memory=current.n_memory, couplings=couplings, closures=closures,
     )  # fmt: skip
-    found = packed_system(same, frames)
-    found.held = packed.held
+    unmerged = packed_system(system, frames)
+    unmerged.held = packed.held
     if packed.qr:
-        qr_sweep.enable_qr_sweep(found)
+        qr_sweep.enable_qr_sweep(unmerged)
     if packed.refined:
-        enable_refinement(found, int(packed.model.refines))
-    resize_workspace(found, found.written.slots)
-    return found
+        enable_refinement(unmerged, int(packed.model.refines))
+    resize_workspace(unmerged, unmerged.written.slots)
+    return unmerged
 
 
 def packed_system(system: System, frames: Frames) -> PackedScene:
-    """Engine arrays of a system, such as one whose forces are others than the scene's."""
+    """Pack a system, such as a variant of that of the scene."""
     ffi, lib = prebuilt_kernels.module()
     written = write_model(system, frames.elements)
-    about = {field.name: getattr(frames, field.name) for field in fields(Frames)}
+    frame_fields = {field.name: getattr(frames, field.name) for field in fields(Frames)}
     packed = PackedScene(
-        **about, system=system, ffi=ffi, lib=lib, model=written.model, written=written,
+        **frame_fields, system=system, ffi=ffi, lib=lib, model=written.model, written=written,
         scratch=written.scratch,
     )  # fmt: skip
-    resize_workspace(packed, written.slots)  # tapes of events are laid out later and may need more
+    resize_workspace(packed, written.slots)  # tapes of events are added later and may need more
     return packed

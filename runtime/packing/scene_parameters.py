@@ -1,6 +1,6 @@
-"""Named numbers of a scene: "rod1.mass", "shoulder.law.stiffness[0]", "gravity[1]", "constants.k".
+"""Parameters of a scene by name: "rod1.mass", "shoulder.law.stiffness[0]", "constants.k".
 
-Whole numbers (members of a chain, shapes of a beam, nodes of a mesh) are no parameters: they decide
+Integers (members of a chain, shapes of a beam, nodes of a mesh) are not parameters: they determine
 the length of q and u.
 """
 
@@ -28,12 +28,14 @@ TABLES = (
     "constraint",
 )  # fmt: skip
 _INDEX = re.compile(r"(.*)\[(\d+)\]")
-_EVERY = re.compile(r"\[\d+\]")
+_INDICES = re.compile(r"\[\d+\]")
 
 
 def scene_data(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
-    """The scene as a file has it, without the ends that every beam has of itself; `evaluated`, with
-    numbers alone for what is written as expressions of named constants."""
+    """Scene as the data of a file, without the default ends of beams.
+
+    With `evaluated`, expressions of named constants are replaced by their values.
+    """
     data = tomllib.loads(to_toml(scene, evaluated))
     for beam in data.get("beam", []):
         for name in ("root", "tip"):
@@ -42,13 +44,15 @@ def scene_data(scene: Scene, evaluated: bool = False) -> dict[str, Any]:
     return data
 
 
-def _named(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+def _elements(data: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+    """(name, table) of all named elements."""
     for table in TABLES:
         for element in data.get(table, []):
             yield element["name"], element
 
 
 def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
+    """(name, value) of all floats in a value."""
     if isinstance(value, float):
         yield path, value
     elif isinstance(value, dict):
@@ -60,152 +64,162 @@ def _numbers(path: str, value: Any) -> Iterator[tuple[str, float]]:
 
 
 def scene_parameters(scene: Scene) -> dict[str, float]:
-    """Every number by its name, in the scene's order."""
+    """Name -> value of all parameters, in the scene's order."""
     data = scene_data(scene, evaluated=True)
-    found = dict(_numbers("constants", data.get("constants", {})))
-    found.update(_numbers("gravity", data["gravity"]))
-    for name, element in _named(data):
-        found.update(_numbers(name, element))
-    return found
+    parameters = dict(_numbers("constants", data.get("constants", {})))
+    parameters.update(_numbers("gravity", data["gravity"]))
+    for name, element in _elements(data):
+        parameters.update(_numbers(name, element))
+    return parameters
 
 
 def with_parameters(scene: Scene, changes: Mapping[str, float]) -> Scene:
-    """The scene with other numbers, validated afresh.
+    """Change parameters of a scene and validate it again.
 
-    A name without an index stands for all entries of a list of one or of equal numbers (both
-    bending stiffnesses of a beam that were given as one), and for all bodies or hinges of a chain's
-    pattern: "rope.body.mass".  Raises SceneError for unknown names and for values that the scene
-    refuses.
+    A name without an index means all entries of a list with one entry or with equal entries (both
+    bending stiffnesses of a beam that were given as one), and all bodies or hinges of a chain's
+    pattern: "rope.body.mass".  Raises SceneError for unknown names and invalid values.
     """
     data = scene_data(scene)
-    there: dict[str, float] | None = None
-    given_as, together = dict[str, str](), dict[str, list[str]]()
-    for path, given in mapping_by_name("parameters", changes).items():
-        value = finite_float(f'parameter "{path}"', given)
-        own = next((one for one in scene.names.meant(path) if _set(data, one, value)), None)
-        if own is None:
-            there = there or scene_parameters(scene)
-            raise _unknown(path, there)
-        beside = together.setdefault(_EVERY.sub("", own), [])
-        alike = [one for one in beside if _meets(own, one)]
-        there = scene_parameters(scene) if alike and there is None else there
-        same = next((one for one in alike if _meant(own, there) == _meant(one, there)), None)
+    parameters: dict[str, float] | None = None
+    given_names, names_without_index = dict[str, str](), dict[str, list[str]]()
+    for given_name, given_value in mapping_by_name("parameters", changes).items():
+        value = finite_float(f'parameter "{given_name}"', given_value)
+        candidates = scene.names.meant(given_name)
+        name = next((path for path in candidates if _set(data, path, value)), None)
+        if name is None:
+            parameters = parameters or scene_parameters(scene)
+            raise _unknown_parameter(given_name, parameters)
+        similar = names_without_index.setdefault(_INDICES.sub("", name), [])
+        overlapping = [other for other in similar if _overlap(name, other)]
+        if overlapping and parameters is None:
+            parameters = scene_parameters(scene)
+        same = next(
+            (o for o in overlapping if _entries(o, parameters) == _entries(name, parameters)), None
+        )
         if same is not None:
-            other = given_as[same]
-            raise SceneError(f'parameters "{other}" and "{path}" are one number; give one of them')
-        given_as[own] = path
-        beside.append(own)
-    for beam in data.get("beam", []):  # an end "tip" with axes of its own stays at the tip
+            raise SceneError(
+                f'parameters: "{given_names[same]}" and "{given_name}" are the same number; give '
+                "one of them"
+            )
+        given_names[name] = given_name
+        similar.append(name)
+    for beam in data.get("beam", []):  # an end "tip" with its own axes stays at the tip
         if "tip" in beam["ends"]:
             beam["ends"]["tip"]["position"] = [beam["length"], 0.0, 0.0]
     return scene_from_data(data, scene)
 
 
-def _meets(name: str, other: str) -> bool:
-    """Whether two names stand for a number together: words without an index stand for each."""
-    words, others = ([part.partition("[") for part in one.split(".")] for one in (name, other))
-    return len(words) == len(others) and all(
-        mine[0] == theirs[0] and (mine[2] == theirs[2] or not (mine[1] and theirs[1]))
-        for mine, theirs in zip(words, others, strict=True)
+def _overlap(name: str, other: str) -> bool:
+    """Whether two names have a number in common: parts without an index mean all entries."""
+    parts, other_parts = ([part.partition("[") for part in n.split(".")] for n in (name, other))
+    return len(parts) == len(other_parts) and all(
+        a[0] == b[0] and (a[2] == b[2] or not (a[1] and b[1]))
+        for a, b in zip(parts, other_parts, strict=True)
     )
 
 
-def _meant(name: str, there: Mapping[str, float] | None) -> set[str]:
-    """All numbers that a name stands for, or itself."""
-    return {one for one in there or () if _meets(name, one)} or {name}
+def _entries(name: str, parameters: Mapping[str, float] | None) -> set[str]:
+    """Parameters that a name means, or the name itself."""
+    return {entry for entry in parameters or () if _overlap(name, entry)} or {name}
 
 
 def scene_from_data(data: dict[str, Any], scene: Scene, where: str = "scene") -> Scene:
-    """The scene that data like those of another one are, validated afresh; `where` begins every
-    message."""
-    _begin_driven(data)
-    found = Scene.from_data(data, where)
-    copy_definitions(found, scene)
-    return found
+    """Validate changed data of a scene; `where` begins every message."""
+    _update_driven_start(data)
+    changed = Scene.from_data(data, where)
+    copy_definitions(changed, scene)
+    return changed
 
 
-def _begin_driven(data: dict[str, Any]) -> None:
-    """Start values of driven coordinates follow the drives, which may have changed."""
+def _update_driven_start(data: dict[str, Any]) -> None:
+    """Set initial values of driven coordinates from the drives, which may have changed."""
     try:
         constants = evaluate_constants(data.get("constants", {}))
     except ValidationProblems:
-        return  # as the scene will be, which says where
+        return  # the validation of the scene reports them
     with constants_context(constants):
         for table in data.get("hinge", []):
-            start = table.get("initial", {})
+            initial = table.get("initial", {})
             for k, drive in enumerate(table.get("drive", ())):
-                by = None if drive == "free" or not start else to_expression(drive, "a drive")
-                if by is not None and by.depends_on_time_only:
-                    q, u, _ = motion_at(by, 0.0)
-                    start["q"][k], start["u"][k] = q, u
+                if drive == "free" or not initial:
+                    continue
+                expression = to_expression(drive, "a drive")
+                if expression.depends_on_time_only:
+                    initial["q"][k], initial["u"][k], _ = motion_at(expression, 0.0)
 
 
 def resolve_names(scene: Scene, names: Sequence[str]) -> list[str]:
-    """The names in full, with the index 0 where a list of one stands without an index.
+    """Full names, with the index 0 for lists with a single entry.
 
-    Raises SceneError for a name that the scene does not have.
+    Raises SceneError for unknown names.
     """
-    there = scene_parameters(scene)
-    alone = {name.replace("[0]", ""): name for name in there}
-    found = []
-    for asked in names:
-        meant = (name for name in scene.names.meant(asked) if name in there or name in alone)
-        name = next(meant, asked)
-        full = name if name in there else alone.get(name, "")
-        if not full or (full != name and full.replace("[0]", "[1]") in there):
-            raise _unknown(name, there)
-        found.append(full)
-    return found
+    parameters = scene_parameters(scene)
+    without_index = {name.replace("[0]", ""): name for name in parameters}
+    full_names = []
+    for given in names:
+        candidates = (
+            name for name in scene.names.meant(given)
+            if name in parameters or name in without_index
+        )  # fmt: skip
+        name = next(candidates, given)
+        full = name if name in parameters else without_index.get(name, "")
+        if not full or (full != name and full.replace("[0]", "[1]") in parameters):
+            raise _unknown_parameter(name, parameters)
+        full_names.append(full)
+    return full_names
 
 
-def _unknown(name: str, known: Mapping[str, float]) -> SceneError:
-    whole = [one for one in known if one.endswith(f".{name}")]
-    hint = f'; did you mean "{whole[0]}"?' if whole else did_you_mean(name, known)
+def _unknown_parameter(name: str, parameters: Mapping[str, float]) -> SceneError:
+    full_names = [full for full in parameters if full.endswith(f".{name}")]
+    hint = f'; did you mean "{full_names[0]}"?' if full_names else did_you_mean(name, parameters)
     return SceneError(f'parameter "{name}": there is no such number in the scene{hint}')
 
 
 def _set(data: dict[str, Any], path: str, value: float) -> bool:
+    """Write `value` at a path of the data; False if the path does not exist."""
     parts = path.split(".")
     owners = _owners(data, parts)
     return any(_assign(owner, parts, value) for owner in owners)
 
 
 def _owners(data: dict[str, Any], parts: list[str]) -> list[Any]:
+    """Tables in which the path continues; removes the element's name from `parts`."""
     if parts[0].startswith("gravity") or (parts[0] == "constants" and len(parts) > 1):
         return [data]
     name = parts.pop(0)
-    return [element for owner, element in _named(data) if owner == name]
+    return [element for owner, element in _elements(data) if owner == name]
 
 
 def _assign(target: Any, parts: list[str], value: float) -> bool:
-    """Write `value` at the end of the path; False where the path leads nowhere."""
+    """Write `value` at the end of the path; False if the path does not exist."""
     for i, part in enumerate(parts):
         match = _INDEX.fullmatch(part)
         key, index = (match[1], int(match[2])) if match else (part, None)
         if not isinstance(target, dict) or key not in target:
             return False
-        holder: Any = target
-        place: Any = key
-        if index is None and key in ("body", "hinge") and isinstance(holder[key], list):
-            return all(_assign(table, parts[i + 1 :], value) for table in holder[key])
-        if isinstance(holder[key], list) and (index is not None or len(holder[key]) == 1):
-            holder, place = holder[key], index or 0
-            if place >= len(holder):
+        container: Any = target
+        entry: Any = key
+        if index is None and key in ("body", "hinge") and isinstance(container[key], list):
+            return all(_assign(table, parts[i + 1 :], value) for table in container[key])
+        if isinstance(container[key], list) and (index is not None or len(container[key]) == 1):
+            container, entry = container[key], index or 0
+            if entry >= len(container):
                 return False
         elif index is not None:
             return False
-        if i == len(parts) - 1 and index is None and _equal_numbers(holder[place]):
-            holder[place] = [float(value)] * len(holder[place])
+        if i == len(parts) - 1 and index is None and _are_equal_numbers(container[entry]):
+            container[entry] = [float(value)] * len(container[entry])
             return True
         if i == len(parts) - 1:
-            if isinstance(holder[place], (dict, list, int)):
+            if isinstance(container[entry], (dict, list, int)):
                 return False
-            holder[place] = float(value)
+            container[entry] = float(value)
             return True
-        target = holder[place]
+        target = container[entry]
     return False
 
 
-def _equal_numbers(value: Any) -> bool:
-    """Whether a value is a list of several numbers, all alike and none of them zero."""
+def _are_equal_numbers(value: Any) -> bool:
+    """Whether a value is a list of equal numbers other than zero."""
     return isinstance(value, list) and len(set(map(str, value))) == 1 and bool(value[0])

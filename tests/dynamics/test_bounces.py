@@ -151,8 +151,8 @@ def test_carnot_in_a_loop() -> None:
         ({"restitution": 0.0}, "more than 0"),
         ({"restitution": 1.5}, "at most 1"),
         ({"restitution": None}, "needs a number above 0"),
-        ({"when": "ball.vy < -1"}, "strikes places"),
-        ({"when": "t > 1"}, "reads no place"),
+        ({"when": "ball.vy < -1"}, "needs a condition on positions"),
+        ({"when": "t > 1"}, "needs a condition on a coordinate"),
         ({"do": "stop"}, 'only do = "bounce" has a restitution'),
     ],
 )
@@ -221,7 +221,7 @@ def test_a_blade_strikes_the_floor(end: str, height: float) -> None:
 
 
 def test_a_shape_alone_is_no_place() -> None:
-    with pytest.raises(mstmm.SceneError, match="strikes places"):
+    with pytest.raises(mstmm.SceneError, match="needs a condition on positions"):
         bladed("blade.q[0] > 0.01").simulate(0.1)
 
 

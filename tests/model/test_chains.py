@@ -222,7 +222,7 @@ def test_parameters_stand_for_all_members() -> None:
     both = compiled(branched()).with_parameters({"side.body.mass": 3.0, "side.body[1].mass": 4.0})
     assert [body.mass for body in both.scene.chain[1].body] == [3.0, 4.0]
     twice = {"rope.body[0].mass": 2.5, "rope.body.mass": 4.0}
-    with pytest.raises(SceneError, match="are one number"):
+    with pytest.raises(SceneError, match="are the same number"):
         model.with_parameters(twice)
     with pytest.raises(SceneError, match=r'parameter "rope\.count"'):
         model.with_parameters({"rope.count": 7.0})

@@ -123,7 +123,7 @@ def test_a_number_that_is_given_twice_is_refused() -> None:
     scene["hinge"][0] |= {"name": "knee", "law": {"damping": 0.3}}
     model = compiled(scene)
     for given in (names := ["knee.law.damping[0]", "knee.law.damping"]), names[::-1]:
-        said = re.escape('"{}" and "{}" are one number'.format(*given))
+        said = re.escape('"{}" and "{}" are the same number'.format(*given))
         with pytest.raises(mstmm.SceneError, match=said):
             model.with_parameters(dict.fromkeys(given, 0.5))
     entries = dict.fromkeys(["rod0.inertia[0]", "rod0.inertia[1]"], 0.5)

@@ -81,7 +81,9 @@ def test_numbers_and_channels_are_found_by_them() -> None:
 
 def test_one_number_by_two_names_is_refused() -> None:
     model = mstmm.compile(mstmm.Scene(**data()))
-    with pytest.raises(mstmm.SceneError, match=r'"arm-1\.mass" and "arm_1\.mass" are one number'):
+    with pytest.raises(
+        mstmm.SceneError, match=r'"arm-1\.mass" and "arm_1\.mass" are the same number'
+    ):
         model.with_parameters({"arm-1.mass": 2.0, "arm_1.mass": 3.0})
 
 

@@ -45,11 +45,11 @@ class LawRecords:
         column("twist")[numbers] = np.where(turn < 0, -1, run.twist + repeats * run.turns + turn)
         for k, law in enumerate(run.pattern):
             pointers = column("effort")[numbers][k :: len(run.pattern)]
-            efforts = np.array(law.efforts, dtype=np.int32)
-            self.memory.kept.append(efforts)
-            pointers[:] = efforts.ctypes.data
-            if len(efforts) > 1:
-                pointers += efforts.strides[0] * np.arange(len(pointers), dtype=pointers.dtype)
+            indices = np.array(law.efforts, dtype=np.int32)
+            self.memory.kept.append(indices)
+            pointers[:] = indices.ctypes.data
+            if len(indices) > 1:
+                pointers += indices.strides[0] * np.arange(len(pointers), dtype=pointers.dtype)
 
     def _fill(self, record: Any, law: LawNumbers) -> None:
         """Fill the fields that all repeats of a law share."""
