@@ -1,4 +1,4 @@
-"""Coupling by loads: which loads depend on the motion of their own body only, and which do not.
+"""Coupling of bodies by loads: which loads depend on more than their own body's motion.
 
 Loads in inertial axes, force elements to the ground and drag depend on the pose and velocity of
 their own body: the tangent of the sweep includes them.  Loads in axes of other bodies, springs

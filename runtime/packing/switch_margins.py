@@ -1,4 +1,4 @@
-"""Switching functions of a scene's expressions: margins that are zero where a branch changes.
+"""Switching functions (margins) of expressions, which are zero where a branch changes.
 
 Comparisons, `sign`, `abs`, `min` and `max` change branch where their argument, or the difference
 of the two, is zero.  If that depends on the motion, a step must end there as at an event.  So even

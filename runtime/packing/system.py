@@ -1,7 +1,7 @@
-"""System: the numbers of a scene in internal frames, as all engines take them.
+"""System: the numbers of a scene in internal frames, the common input of all engines.
 
-Nothing in here knows of C.  Numbers are floats, or Duals that carry their derivatives.  Of a chain
-the members that are alike share one record.
+It is independent of C.  Numbers are floats, or Duals with derivatives.  Equal members of a chain
+share one record.  "Position" means the position of a body in the tree; the ground is -1.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from mstmm.numerics.piecewise_polynomial import PiecewisePolynomial
 from .coordinate_layout import Group
 
 Numbers = tuple[float, ...]
-#: Force elements whose laws do not go by time.
-_BUILT_IN: tuple[Key, ...] = (
+#: Force elements whose laws do not depend on time.
+_TIME_INDEPENDENT: tuple[Key, ...] = (
     ("force", "spring"), ("force", "bushing6"), ("force", "bearing6"), ("force", "bearing3"),
 )  # fmt: skip
-#: Places among the values of the scene's expressions, -1 for the constant zero.
+#: Indices of values of the scene's expressions, -1 for constant zero.
 Places = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Arrays:
-    """Arrays by their names; two are equal where all their numbers are."""
+    """Named arrays; equal if all their entries are equal."""
 
     named: Mapping[str, Array]
 
@@ -46,10 +46,13 @@ class Arrays:
 
 @dataclass(frozen=True, slots=True)
 class ModalNumbers:
-    """Internal coordinates of the flexible body whose floating frame a body is.
+    """Modal coordinates of a flexible body, stored with its floating frame.
 
-    `moments` and `drag` are inputs of kernels of ("sweep", "modal"); `stiffness` and `damping` are
-    n x n.
+    Attributes:
+        n: number of modes.
+        q, u: index of the first one in q and in u.
+        moments, drag: inputs of the kernels ("sweep", "modal").
+        matrices: "stiffness" and "damping" (n, n).
     """
 
     n: int
@@ -62,8 +65,14 @@ class ModalNumbers:
 
 @dataclass(frozen=True, slots=True)
 class SectionNumbers:
-    """A section of the flexible body with its frame at place `frame`, passed inward to the frame or
-    outward from it; `inputs` are those of the kernel "section", `end` its axes at rest (9)."""
+    """Section of a flexible body in a connection.
+
+    Attributes:
+        frame: position of the floating frame.
+        inward: whether the connection leads to the frame, or from it.
+        inputs: of the kernel "section".
+        end: axes of the section in the undeformed body (9).
+    """
 
     frame: int
     inward: bool
@@ -73,16 +82,20 @@ class SectionNumbers:
 
 @dataclass(frozen=True, slots=True)
 class BodyNumbers:
-    """A body with its inboard hinge, but for its place in the tree.
+    """Body with its inboard hinge, without its position.
 
-    `straight` says that the rates of the hinge's coordinates are its speeds, `steady` that its
-    motions are the same in every position, seen from the outboard body, `turning` that they are
-    turns alone besides.
-    `connection` is Rt (9) and ro (3), `link` the same as screws about x and z where it can be one
-    (`alignment`), else empty.  `height` is that of the frame over the hinge's own P, along z.
-    `body_frame` is the frame in the user's (rotation, origin), empty for a rigid body.  `rotor` and
-    `imposed` go by speed, `release` is a place in memory or -1.  `idle` is an end that nothing
-    hangs on or acts on.  `linked` says that it may be swept as a link.
+    Attributes:
+        straight, steady, turning: see `HingeSlots`.
+        connection: Rt (9) and ro (3).
+        link: the same as screws about x and z (`denavit_hartenberg`); empty if impossible.
+        height: shift along z of the internal frame from the hinge's outboard frame, m.
+        hinge_p, body_p: parameters of the kernels.
+        body_frame: internal frame in user axes: rotation (9), origin (3); empty for a rigid body.
+        rotor: inertia by speed.
+        imposed: 1 for each prescribed speed.
+        release: index in memory, -1 if the hinge is never released.
+        idle: whether it is an end without hinges, loads and force elements.
+        linked: whether it may be swept as a link.
     """
 
     hinge: Key
@@ -109,11 +122,15 @@ class BodyNumbers:
 
 @dataclass(frozen=True, slots=True)
 class BodyRun:
-    """`count` bodies in a row from `place` on, each the child of the one before: a body of its own,
-    or a chain.
+    """Bodies at consecutive positions, each the child of the previous: a single body or a chain.
 
-    `alike` are the first member, one `period` of those that repeat behind it, and the last.
-    `slots` are the hinges' places in q and u.
+    Attributes:
+        place: position of the first one.
+        parent: position of its parent.
+        count: number of bodies.
+        period: number of bodies after which the pattern repeats.
+        alike: the first member, one period of the following ones, and the last.
+        slots: indices of the hinges in q and u.
     """
 
     place: int
@@ -125,10 +142,10 @@ class BodyRun:
 
     @property
     def which(self) -> Integers:
-        """Member by member its number among `alike`."""
-        found = 1 + np.arange(-1, self.count - 1) % self.period
-        found[0], found[-1] = 0, len(self.alike) - 1
-        return found
+        """Index in `alike` of each member (count,)."""
+        indices = 1 + np.arange(-1, self.count - 1) % self.period
+        indices[0], indices[-1] = 0, len(self.alike) - 1
+        return indices
 
     def member(self, k: int) -> BodyNumbers:
         """Numbers of member k."""
@@ -139,10 +156,15 @@ class BodyRun:
 
 @dataclass(frozen=True, slots=True)
 class LawNumbers:
-    """The law `kernel` on n speeds of a hinge, that of `member` in the pattern of its run.
+    """Law on n speeds of a hinge.
 
-    `turn` is its number among the pattern's laws that remember a turn, or -1; `axes` (9) are
-    theirs.  `efforts` go by speed: one for all repeats of the pattern, or one for each.
+    Attributes:
+        member: number of the hinge in the pattern of its run.
+        kernel: name of the law kernel.
+        coordinate, speed: first ones within the hinge.
+        turn: number among the pattern's laws that track a rotation angle in memory, or -1.
+        axes: of such a law (9).
+        efforts: expression values by speed: once for all repeats of the pattern, or for each.
     """
 
     member: int
@@ -158,8 +180,15 @@ class LawNumbers:
 
 @dataclass(frozen=True, slots=True)
 class LawRun:
-    """`count` laws on the bodies from `place` on: those of a pattern of `period` bodies, repeated;
-    `twist` is the first of their places in memory."""
+    """Laws of a run of bodies: those of a pattern, repeated.
+
+    Attributes:
+        place: position of the first body.
+        count: number of laws.
+        period: number of bodies of the pattern.
+        pattern: its laws.
+        twist: index in memory of the first tracked rotation angle.
+    """
 
     place: int
     count: int
@@ -169,21 +198,21 @@ class LawRun:
 
     @property
     def turns(self) -> int:
-        """Laws of the pattern that remember a turn."""
+        """Number of laws of the pattern that track a rotation angle."""
         return sum(law.turn >= 0 for law in self.pattern)
 
     @property
     def next_twist(self) -> int:
-        """Place in memory behind the last of the run."""
+        """Index in memory after the last tracked angle of the run."""
         repeats, rest = divmod(self.count, len(self.pattern))
         return self.twist + repeats * self.turns + sum(x.turn >= 0 for x in self.pattern[:rest])
 
     def each(self) -> Iterator[tuple[LawNumbers, int, int, Places]]:
-        """(law, place of its body, place in memory or -1, efforts) one by one."""
+        """All laws: (law, position of its body, index in memory or -1, efforts)."""
         turns = self.turns
         for row in range(self.count):
-            repeat, which = divmod(row, len(self.pattern))
-            law = self.pattern[which]
+            repeat, k = divmod(row, len(self.pattern))
+            law = self.pattern[k]
             twist = self.twist + repeat * turns + law.turn if law.turn >= 0 else -1
             body = self.place + repeat * self.period + law.member
             yield law, body, twist, law.efforts[repeat if len(law.efforts) > 1 else 0]
@@ -191,8 +220,15 @@ class LawRun:
 
 @dataclass(frozen=True, slots=True)
 class LoadNumbers:
-    """Force and moment at a point of a body; components in axes of the body `axes` (-1: inertial),
-    which lie in its internal ones as `axes_own` says."""
+    """Force and moment at a point of a body.
+
+    Attributes:
+        body, axes: positions of the loaded body and of the body whose axes the components are in
+            (-1: inertial axes).
+        axes_own: axes of the components in the internal ones of `axes` (9).
+        offset: point in internal axes, m.
+        force, moment: expression values of the components.
+    """
 
     body: int
     axes: int
@@ -204,8 +240,13 @@ class LoadNumbers:
 
 @dataclass(frozen=True, slots=True)
 class ForceNumbers:
-    """Massless element between (body, axes (9), offset (3)) of an end F and of an end T; body -1 is
-    the ground.  `effort`: t, q, u, [length, its rate] -> given effort."""
+    """Massless force element between two ends.
+
+    Attributes:
+        ends: (position of the body, axes (9), offset (3) in m) of the ends "from" and "to".
+        p: parameters of the kernel.
+        effort: kernel (t, q, u, [length, its rate]) -> prescribed effort; None without one.
+    """
 
     element: Key
     ends: tuple[tuple[int, Numbers, Numbers], tuple[int, Numbers, Numbers]]
@@ -215,30 +256,37 @@ class ForceNumbers:
 
 @dataclass(frozen=True, slots=True)
 class HeldInputs:
-    """Inputs that stand in memory, where they are set as a run goes on: `places` of all inputs
-    there, -1 for those that go by time; memory begins from `first` on with `start`."""
+    """Inputs that controllers set during a run, in memory.
+
+    Attributes:
+        first: index in memory of the first number.
+        places: index in memory of each input, -1 for functions of time.
+        start: initial numbers from `first` on.
+    """
 
     first: int
     places: tuple[int, ...]
     start: Numbers = ()
 
 
-#: Directions of a closure, each with a place in memory where rows are chosen.
+#: Number of directions of a closure, and of its entries in memory if its rows are chosen.
 DIRECTIONS = 6
 
 
 @dataclass(frozen=True, slots=True)
 class ClosureNumbers:
-    """What closes a loop: a hinge, behind which the body without mass at place `frame` is to be
-    where an end of the body at place `outboard` (-1: the ground) is, its axes turned by `turn` (9)
-    and its origin at `end` (3) in that body's.  `directions` are those of the rows: 0 to 5, the
-    hinge's speeds first.
+    """Closure of a loop: a massless frame must coincide with an end of a body.
 
-    Constraints ask less of the two: as `kind` says, one of those in derive/equations/constraints.py
-    with its numbers `p`, or "hinge".  `of_speeds` are the directions in which nothing is asked of
-    positions.  Of the six directions the first `asked` say something; those without a row repeat
-    what others do.  Where some of the rows repeat the others but which do changes along the way,
-    `choice` tells the first place in memory of whether each is at rest, and how many count.
+    Attributes:
+        frame, outboard: positions of the massless frame and of the body.
+        turn, end: axes (9) and origin (3, m) of that end in the internal axes of the body.
+        directions: directions that have a constraint row, of 0 to 5, the hinge's speeds first.
+        kind: "hinge", or a constraint of derive/equations/constraints.py, which constrains less.
+        p: numbers of the constraint.
+        of_speeds: directions that are constrained at the level of speeds only.
+        asked: number of constrained directions; those of them without a row are redundant.
+        choice: (first index in memory, number of active rows) if the redundant rows change during
+            the motion; memory holds whether each row is inactive.
     """
 
     frame: int
@@ -255,8 +303,7 @@ class ClosureNumbers:
 
 @dataclass(frozen=True, slots=True)
 class CoupledHinge:
-    """A hinge that a coupling names: `place` of the body, or frame, whose inboard hinge it is, and
-    places of the bodies on both sides (-1: the ground)."""
+    """Hinge of a coupling: positions of its outboard body or frame, and of the coupled bodies."""
 
     place: int
     inboard: int
@@ -265,9 +312,14 @@ class CoupledHinge:
 
 @dataclass(frozen=True, slots=True)
 class CouplingNumbers:
-    """A row between coordinates of hinges, or `of_speeds`; its numbers are those of `coupled` from
-    `first` on.  `kept` is the value that it keeps, None while that is not known; `repeats` says
-    that other rows do what it asks, so that it has none."""
+    """Constraint between coordinates or speeds of hinges.
+
+    Attributes:
+        first: index of its numbers in the output of `System.coupled`.
+        of_speeds: whether it is on speeds.
+        kept: constant value of its expression, None while it is unknown.
+        repeats: whether it is redundant and has no row.
+    """
 
     name: str
     first: int
@@ -279,16 +331,20 @@ class CouplingNumbers:
 
 @dataclass(frozen=True)
 class System:
-    """A scene in internal frames.
+    """Scene in internal frames.
 
-    `values` gives efforts and load components of (t, q, u); `drives` value, rate and acceleration
-    of each of `driven` (place of the body, coordinate).  `inputs` are inputs and signals over time,
-    whose numbers expressions read, of which some may be `held`; `by_time` says whether an
-    effort or load names the time, or an input that does not stand still.  `moving` are the numbers
-    in expressions that carry derivatives, by their places in the port "moving".  `closures` are
-    what closes loops; `coupled` gives the numbers of the `couplings` (pack/loops/couplings).
-    `strained` is the place in memory that tells whether the last step ended near a singular pose,
-    -1 where nothing can close.
+    Attributes:
+        n_memory: length of the memory of a run.
+        strained: index in memory of whether the last step ended near a singular configuration,
+            -1 without loops.
+        values: kernel of efforts and load components.
+        drives: kernel of value, rate and acceleration of each driven coordinate.
+        driven: (position of the body, coordinate) of each driven coordinate.
+        inputs: inputs and signals over time.
+        held: those that are set during a run.
+        by_time: whether an effort or load depends on time, also by an input.
+        moving: numbers in expressions that carry derivatives, by index in the port "moving".
+        coupled: kernel of the numbers of `couplings` (`loops.coupling_numbers`).
     """
 
     nq: int
@@ -313,62 +369,61 @@ class System:
 
     @property
     def remembers(self) -> bool:
-        """Whether a state alone does not say how it goes on."""
+        """Whether the motion depends on memory in addition to the state."""
         return self.n_memory > (self.strained >= 0)
 
     @property
     def chosen(self) -> range:
-        """Places in memory that tell which rows of closed loops are at rest."""
-        firsts = [one.choice[0] for one in self.closures if one.choice is not None]
+        """Indices in memory of the inactive constraint rows."""
+        firsts = [closure.choice[0] for closure in self.closures if closure.choice is not None]
         return range(firsts[0], firsts[-1] + DIRECTIONS) if firsts else range(0)
 
     @property
     def closes(self) -> bool:
-        """Whether anything closes but the tree."""
+        """Whether there are closed loops."""
         return bool(self.closures or self.couplings)
 
     def awake(self, place: int) -> System:
-        """The same where the body at a place of the tree is none that is idle."""
-        found = tuple(
+        """System in which the body at a position is not idle."""
+        bodies = tuple(
             replace(run, alike=(replace(run.alike[0], idle=False),))
             if run.place == place and run.count == 1 else run
             for run in self.bodies
         )  # fmt: skip
-        return replace(self, bodies=found)
+        return replace(self, bodies=bodies)
 
     @property
     def count(self) -> int:
-        """How many bodies there are."""
+        """Number of bodies."""
         return self.bodies[-1].place + self.bodies[-1].count if self.bodies else 0
 
     @property
     def dragged(self) -> list[int]:
-        """Places of the flexible bodies on which the medium drags."""
-        dragged = self.rows(lambda one: one.modal is not None and one.modal.drag is not None)
-        return [int(place) for place in np.flatnonzero(dragged)]
+        """Positions of the flexible bodies with viscous drag."""
+        has_drag = self.rows(lambda body: body.modal is not None and body.modal.drag is not None)
+        return [int(place) for place in np.flatnonzero(has_drag)]
 
     @property
     def steady(self) -> bool:
-        """Whether nothing goes by time: neither drive nor expression nor what a coupling equals,
-        nor an element that may."""
-        own = any(force.element not in _BUILT_IN for force in self.forces)
-        coupled = self.coupled is not None and reads_port(self.coupled, "t")
-        return not (self.driven or self.timed or own or coupled)
+        """Whether nothing depends on time: drives, expressions, couplings and force elements."""
+        unknown_elements = any(force.element not in _TIME_INDEPENDENT for force in self.forces)
+        timed_coupling = self.coupled is not None and reads_port(self.coupled, "t")
+        return not (self.driven or self.timed or unknown_elements or timed_coupling)
 
     @property
     def timed(self) -> bool:
-        """Whether an expression of an effort or load goes by time."""
+        """Whether an expression of an effort or load depends on time."""
         kernels = [self.values, *(force.effort for force in self.forces)]
-        reading = any(kernel is not None and reads_port(kernel, "t") for kernel in kernels)
-        return reading and self.by_time
+        reads_time = any(kernel is not None and reads_port(kernel, "t") for kernel in kernels)
+        return reads_time and self.by_time
 
     def inputs_at(self, t: float) -> Array:
-        """The numbers of all inputs at a time, as expressions read them."""
-        return np.array([x for one in self.inputs for x in one.at(t)])
+        """Numbers of all inputs at a time (s), as expressions read them."""
+        return np.array([x for channel in self.inputs for x in channel.at(t)])
 
     @property
     def n_values(self) -> int:
-        """How many values the expressions give."""
+        """Number of expression values."""
         return 0 if self.values is None else self.values.outputs[0].length()
 
     @cached_property
@@ -376,46 +431,47 @@ class System:
         return [run.place for run in self.bodies]
 
     def body(self, place: int) -> BodyNumbers:
-        """Numbers of the body at a place of the tree."""
+        """Numbers of the body at a position."""
         run = self.bodies[bisect_right(self._starts, place) - 1]
         return run.member(place - run.place)
 
     @property
     def distinct(self) -> Iterator[BodyNumbers]:
-        """Every body that differs from others."""
+        """Distinct bodies; equal members of a chain appear once."""
         for run in self.bodies:
             yield from run.alike
 
     @property
     def parents(self) -> Integers:
-        """Place of every body's parent, -1 for the ground."""
-        found = np.arange(-1, self.count - 1)
+        """Position of every body's parent (count,), -1 for the ground."""
+        parents = np.arange(-1, self.count - 1)
         for run in self.bodies:
-            found[run.place] = run.parent
-        return found
+            parents[run.place] = run.parent
+        return parents
 
     @property
     def places(self) -> dict[str, Integers]:
-        """Every body's first coordinate "q" and first speed "u"."""
+        """Index of every body's first coordinate "q" and first speed "u" (count,)."""
         q, u = np.zeros((2, self.count), dtype=np.int64)
         for run in self.bodies:
-            members, one, slots = slice(run.place, run.place + run.count), run.count == 1, run.slots
-            q[members] = slots.q if one else slots.q_places()
-            u[members] = slots.u if one else slots.u_places()
+            members, slots = slice(run.place, run.place + run.count), run.slots
+            is_single = run.count == 1
+            q[members] = slots.q if is_single else slots.q_places()
+            u[members] = slots.u if is_single else slots.u_places()
         return {"q": q, "u": u}
 
     @property
     def which(self) -> Integers:
-        """Body by body its number among the `distinct` ones."""
-        found, first = np.zeros(self.count, dtype=np.int64), 0
+        """Index of every body in `distinct` (count,)."""
+        indices, first = np.zeros(self.count, dtype=np.int64), 0
         for run in self.bodies:
             if run.count == 1:
-                found[run.place] = first
+                indices[run.place] = first
             else:
-                found[run.place : run.place + run.count] = first + run.which
+                indices[run.place : run.place + run.count] = first + run.which
             first += len(run.alike)
-        return found
+        return indices
 
     def rows(self, number: Callable[[BodyNumbers], Any]) -> NDArray[Any]:
-        """A number of every body, or a row of as many of each."""
-        return np.array([number(one) for one in self.distinct])[self.which]
+        """Array (count, ...) of a number, or a fixed number of them, of every body."""
+        return np.array([number(body) for body in self.distinct])[self.which]

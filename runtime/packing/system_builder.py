@@ -1,4 +1,4 @@
-"""Scene -> System: placement, alignment and layout of everything a scene holds."""
+"""Construction of the system of a scene: topology, layout, internal frames and numbers."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ from .system import HeldInputs, LoadNumbers, Numbers, System
 
 
 def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) -> ExpandedScene:
-    """The scene of nodes; scenes without flexible bodies are their own.
+    """Expand a scene into nodes, after rigid substitution and cutting of loops.
 
-    `flexible` are the numbers of all modal bodies where they are known already.
+    `flexible` are all modal bodies if they are known already.
     """
     if not (scene.beam or scene.elastic):
         nodes, cuts = cut_loops(scene)
@@ -50,13 +50,15 @@ def expansion_of(scene: Scene, flexible: Mapping[str, ModalBody] | None = None) 
     from ..flexible.flexible_bodies import modal_bodies
     from .flexible.rigid_substitution import substitute_rigid_bodies
 
-    rigid = substitute_rigid_bodies(scene, flexible or {})
-    known = {name: body for name, body in (flexible or {}).items() if name not in rigid.one_way}
-    nodes, cuts = cut_loops(rigid.scene)
-    bodies = modal_bodies(rigid.scene) if flexible is None else known
+    substitution = substitute_rigid_bodies(scene, flexible or {})
+    nodes, cuts = cut_loops(substitution.scene)
+    if flexible is None:
+        bodies = modal_bodies(substitution.scene)
+    else:
+        bodies = {n: body for n, body in flexible.items() if n not in substitution.one_way}
     expanded = expand(nodes, bodies, cuts)
-    expanded.described, expanded.rigidified = scene, rigid
-    expanded.nodes |= rigid.nodes
+    expanded.described, expanded.rigidified = scene, substitution
+    expanded.nodes |= substitution.nodes
     return expanded
 
 
@@ -69,16 +71,16 @@ def system_of(
     moving: Mapping[int, Any] | None = None,
     simplify: Words = LINKED,
 ) -> tuple[System, Frames]:
-    """The numbers of a scene, and where everything lies; `known` are elements beyond the prebuilt.
+    """Build the system of a scene, and the positions of all its parts.
 
-    Without `align` internal frames are those of the bodies' own hinges, whatever hangs on them:
-    smooth functions of the scene's numbers.  `flexible` are the numbers of all modal bodies
-    where they are known already, `moving` those that expressions take from the port "moving".
-    `simplify` are words of `merge.simplification`.
+    `known` are elements in addition to the prebuilt ones.  Without `align` internal frames depend
+    on the body's own hinge only, and are smooth functions of the scene's numbers.  `flexible` are
+    all modal bodies if they are known already, `moving` the numbers of the port "moving".
+    `simplify` are the options of `merging.simplification`.
 
-    Raises SceneError for hinges that do not form a tree or types that nobody defines.
+    Raises SceneError for hinges that do not form a tree, and for unknown types.
     """
-    expanded, told = _with_exact_turns(expansion_of(scene, flexible), simplify)
+    expanded, simplifications = _with_right_angles(expansion_of(scene, flexible), simplify)
     elements = Elements({**(known or {}), **curve_elements(scene.constraint)})
     nodes, tree = expanded.scene, build_topology(expanded.scene)
     carried = find_welded_bodies(expanded, tree) if WELDS in simplify else WeldedBodies()
@@ -88,22 +90,22 @@ def system_of(
     bodies = Bodies(expanded, tree, layout, elements, releases, align, LINKS in simplify, carried)
     runs = tuple(map(bodies.run, tree.runs))
     if not may_have_loops(scene):
-        told += link_detection.link_simplifications(
+        simplifications += link_detection.link_simplifications(
             runs, (nodes.hinges.name(run.hinge) for run in tree.runs)
         )
     frames = Frames(
         nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
         Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
-        expanded, (*carried.told(nodes), *told), simplify,
+        expanded, (*carried.told(nodes), *simplifications), simplify,
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
-    driven, values = list(_driven(nodes, tree)), Values(layout, ports)
-    remembered = len(releases) + sum(event.do == "bounce" for event in scene.events)
-    strained = remembered if may_have_loops(scene) else -1
-    remembered += strained >= 0
-    laws = tuple(law_runs(nodes, tree, layout, values, remembered))
-    loads = tuple(_load(frames, load, values) for load in nodes.load)
-    held = _held(scene, laws[-1].next_twist if laws else remembered)
+    driven, values = list(_driven_coordinates(nodes, tree)), Values(layout, ports)
+    n_memory = len(releases) + sum(event.do == "bounce" for event in scene.events)
+    strained = n_memory if may_have_loops(scene) else -1
+    n_memory += strained >= 0
+    laws = tuple(law_runs(nodes, tree, layout, values, n_memory))
+    loads = tuple(_load_numbers(frames, load, values) for load in nodes.load)
+    held = _held_inputs(scene, laws[-1].next_twist if laws else n_memory)
     couplings, coupled = coupling_numbers(frames, runs)
     system = System(
         layout.nq, layout.nu, held.first + len(held.start), strained, nodes.gravity, runs,
@@ -117,47 +119,49 @@ def system_of(
     return system, frames
 
 
-def _with_exact_turns(
+def _with_right_angles(
     expanded: ExpandedScene, simplify: Words
 ) -> tuple[ExpandedScene, list[Simplification]]:
-    scene, told = expanded.scene, list[Simplification]()
-    if TURNS in simplify:
-        scene, told = with_right_angles(scene, simplify[TURNS])
-    return (replace(expanded, scene=scene) if told else expanded), told
+    if TURNS not in simplify:
+        return expanded, []
+    scene, changes = with_right_angles(expanded.scene, simplify[TURNS])
+    return (replace(expanded, scene=scene) if changes else expanded), changes
 
 
-def _held(scene: Scene, first: int) -> HeldInputs:
-    """The inputs that controllers set, in memory from `first` on: of each controller the number of
-    its next sample, its state, and what it holds."""
+def _held_inputs(scene: Scene, first: int) -> HeldInputs:
+    """Inputs that controllers set, in memory from index `first` on.
+
+    For each controller: the number of its next sample (NaN at the start), its state, its outputs.
+    """
     places, start = dict.fromkeys(scene.channels, -1), list[float]()
-    for one in scene.controller:
-        start += [math.nan, *one.filled["initial"]]
-        for name in one.outputs:
+    for controller in scene.controller:
+        start += [math.nan, *controller.filled["initial"]]
+        for name in controller.outputs:
             places[name] = first + len(start)
             start.append(scene.channels[name].value(0.0))
     return HeldInputs(first, tuple(places.values()), tuple(start))
 
 
 def has_timed_loads(scene: Scene, inputs: Inputs) -> bool:
-    """Whether an effort or load names the time, or an input that does not stand still."""
-    loads = (one for one in active_expressions(scene) if not (one.drive or one.condition))
-    names = {name.text for one in loads for name in one.expression.names}
+    """Whether an effort or load depends on time, or on an input that is not constant."""
+    active = (a for a in active_expressions(scene) if not (a.drive or a.condition))
+    names = {name.text for load in active for name in load.expression.names}
     return "t" in names or any(not inputs[name].stands for name in names & inputs.keys())
 
 
-def _driven(scene: Scene, tree: Topology) -> Iterator[tuple[int, int, Expression]]:
-    """(place of the body, coordinate, drive) of everything driven."""
-    for place, hinge in _with_drives(scene, tree):
+def _driven_coordinates(scene: Scene, tree: Topology) -> Iterator[tuple[int, int, Expression]]:
+    """(position of the body, coordinate, drive) of all driven coordinates."""
+    for place, hinge in _driven_hinges(scene, tree):
         for k, entry in enumerate(hinge.drive or ()):
             if entry is not None:
                 yield place, k, entry
 
 
-def _with_drives(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTable]]:
-    """(place, table) of every hinge with a drive."""
-    tables = len(scene.hinge)
+def _driven_hinges(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTable]]:
+    """(position in the tree, table) of all hinges with a drive."""
+    single_hinges = len(scene.hinge)
     for run in tree.runs:
-        if run.hinge < tables:
+        if run.hinge < single_hinges:
             if scene.hinge[run.hinge].drive is not None:
                 yield run.place, scene.hinge[run.hinge]
             continue
@@ -167,7 +171,7 @@ def _with_drives(scene: Scene, tree: Topology) -> Iterator[tuple[int, HingeTable
                 yield run.place + k, chain.hinge_of(k)
 
 
-def _load(frames: Frames, load: Load, values: Values) -> LoadNumbers:
+def _load_numbers(frames: Frames, load: Load, values: Values) -> LoadNumbers:
     body, _, offset = frames.end(load.on)
     if load.at is not None:
         offset = frames.mass_center(load.on)
@@ -181,7 +185,7 @@ def _load(frames: Frames, load: Load, values: Values) -> LoadNumbers:
 
 
 def _section_axes(frames: Frames, reference: str) -> Numbers:
-    """Axes of a section of a flexible body (turned with it) in those of its end; else none."""
+    """Undeformed axes (9) of a section of a flexible body in those of its node; else empty."""
     node = frames.expanded.nodes.get(reference)
     passage = frames.expanded.passages.get(node or "")
     return () if passage is None else tuple(passage.port.rotation.T.ravel().tolist())

@@ -1,4 +1,4 @@
-"""Constraint rows of [[coupling]] as functions of t, q and u: position gap, rate and columns.
+"""Constraint rows of [[coupling]] as functions of t, q, u: position gap, rate, columns.
 
 With phi(q, t) = 0 and the rates q' of all coordinates, which are functions of q and u,
 

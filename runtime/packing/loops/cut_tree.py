@@ -1,4 +1,4 @@
-"""Spanning tree of a scene with closed loops: cut hinges and constraints end at massless frames.
+"""Spanning tree of a scene: cut hinges and constraints end at massless frames.
 
 The frame C of a cut hinge is a massless body with the ends of the body B that it replaces, so that
 the cut hinge keeps its kernels, coordinates, law and drive.  The constraint rows of the loop

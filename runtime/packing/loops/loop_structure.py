@@ -32,7 +32,7 @@ def with_loops(
     tuple[BodyStructure, ...], tuple[ClosureStructure, ...], tuple[RowStructure, ...],
     tuple[CouplingStructure, ...],
 ]:  # fmt: skip
-    """Bodies with their pending rows, closures in the order of their frames, rows, and couplings.
+    """Bodies with pending rows, closures in the order of their frames, rows, and couplings.
 
     `floors` are the pivots (rows,) below which they count as rounding; without them it is zero.
     """

@@ -23,7 +23,7 @@ _FRAME_INDEPENDENT = {
 
 
 def motion_plane(system: System, elements: Elements) -> Array | None:
-    """Axes (3, 3) of the plane of motion in inertial axes, z normal to it; None if there is none.
+    """Axes (3, 3) of the plane of motion in inertial axes, z normal to it; None without one.
 
     All bodies must be rigid, on parallel free hinge axes, and only hinges may close loops.
     Positions and loads normal to the plane do not matter.  If the plane is not the inertial xy

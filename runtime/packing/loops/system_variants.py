@@ -135,7 +135,7 @@ def with_loops_open(system: System) -> System:
 
 
 def with_stiff_modes(system: System) -> System:
-    """Replace modal stiffness by large modal masses, so that modes only move if nothing else can.
+    """Give modes large masses, in proportion to their stiffness, so that they move last.
 
     Used to close loops with the least deformation.
     """

@@ -1,1 +1,1 @@
-"""Simplifications of a scene that do not change its motion: merged bodies, exact right angles."""
+"""Simplifications that do not change the motion: merged bodies, exact right angles."""

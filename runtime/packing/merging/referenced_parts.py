@@ -1,4 +1,4 @@
-"""Bodies and hinges that expressions, outputs and events refer to; simplifications keep them."""
+"""Bodies and hinges that expressions, outputs and events refer to, which must be kept."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ class Simplification:
 
 
 def parse_simplify(simplify: bool | Collection[str] | Words) -> Words:
-    """Parse the option `simplify`; a table keeps the defaults of the kinds that it does not name.
+    """Parse the option `simplify`; kinds that a table does not name keep their defaults.
 
     Raises SceneError for unknown kinds and invalid values.
     """

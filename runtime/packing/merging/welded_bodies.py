@@ -62,7 +62,7 @@ class WeldedBodies:
 
 
 def find_welded_bodies(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
-    """Find the rigid bodies to be merged: those that a fixed hinge of the scene welds to another.
+    """Find the rigid bodies to be merged: those on a fixed hinge to another rigid body.
 
     Excluded are hinges that may be released or whose load is used during the run, and sections of
     flexible bodies.  Nothing is merged with one-way coupled bodies, or with closed loops, whose

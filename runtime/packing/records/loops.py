@@ -107,7 +107,7 @@ class LoopRecords:
 def attach_loops(
     model: Any, system: System, memory: Memory, lib: Any, place: int
 ) -> tuple[int, LoopRecords | None]:
-    """Write the rows of the loops to the model, and reserve workspace for them at offset `place`.
+    """Write the constraint rows to the model, and reserve workspace at offset `place`.
 
     Returns the offset behind them, and the records.
     """
