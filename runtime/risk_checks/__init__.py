@@ -1,1 +1,1 @@
-"""What is looked at before a run, and what is done about risks."""
+"""Checks before a run, checks of answers about a state, and the reaction to risks."""

@@ -1,7 +1,7 @@
-"""Checks of answers that are no runs: equilibria, assemblies, linear models and what they give.
+"""Checks of answers about a state: equilibria, assemblies, linear models and their results.
 
-An answer about a state is examined as a run that takes no time there, by the checks that runs have;
-what is peculiar to linear models is added by `runtime/linear/validity.py`.
+Such an answer is checked as a run of zero duration, by the checks of runs; checks that only concern
+linear models are in `runtime/linear/validity.py`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _STEPS = "an answer about a state takes no steps"
 _TIME = "an answer about a state covers no time"
 
-#: Risks of runs that answers about a state are not examined for, and why.
+#: Risk of runs that does not apply to answers about a state -> reason.
 NOT_APPLICABLE = {
     "step-stability": _STEPS,
     "step-accuracy": _STEPS,
@@ -44,23 +44,26 @@ NOT_APPLICABLE = {
 
 
 def find_state_risks(model: CompiledScene, t: float, q: Array, u: Array) -> tuple[Risk, ...]:
-    """Risks of the state q (nq,), u (nu,) at t (s): of its models, its sweep and its loops."""
+    """Find the risks of the state q (nq,), u (nu,) at t (s): of its models, sweep and loops."""
     settings = Settings(t, t)
-    start = check_before_run(model, settings, q, u)
-    return result_of(model, start.given(driven_states(model, settings, q, u, [t]), q, u)).risks
+    findings = check_before_run(model, settings, q, u)
+    return result_of(model, findings.given(driven_states(model, settings, q, u, [t]), q, u)).risks
 
 
 def merge_over_values(
     parameter: str, found: Sequence[tuple[float, Iterable[Risk]]]
 ) -> Iterator[Risk]:
-    """Risks over the values of a parameter: of each kind and element the one with the largest
-    figure, which says at which value and at how many others."""
+    """Merge risks found over the values of a parameter: the worst of each kind and element.
+
+    Its text states the value, and the number of other values with the same risk.
+    """
     groups = dict[tuple[str, str], list[tuple[float, Risk]]]()
     for value, risks in found:
         for risk in risks:
             groups.setdefault((risk.name, risk.element), []).append((value, risk))
     for rows in groups.values():
-        value, worst = max(rows, key=lambda row: (row[1].doubt, abs(row[1].figure or 0.0)))
-        others = len({one for one, _ in rows}) - 1
-        where = f"at {parameter} = {value:g}" + (f" and {others} other values" if others else "")
+        worst_value, worst = max(rows, key=lambda row: (row[1].doubt, abs(row[1].figure or 0.0)))
+        others = len({value for value, _ in rows}) - 1
+        where = f"at {parameter} = {worst_value:g}"
+        where += f" and {others} other values" if others else ""
         yield replace(worst, means=f"{where}: {worst.means}")

@@ -1,4 +1,4 @@
-"""Hinges that begin where their coordinates fail, or that a drive takes there."""
+"""Hinges whose coordinates are singular at the start or along a drive (gimbal lock)."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 def applies_to(model: CompiledScene) -> bool:
-    """Whether coordinates of a hinge fail anywhere."""
+    """Whether a hinge has coordinates that may be singular."""
     return may_be_singular(model)
 
 
 def coordinate_singularity_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
-    """The nearest of them, at the start and where drives go."""
-    moved = driven_states(model, settings, q, u, drive_times(model, settings))
-    found = singular_distance(model, moved)
-    if found is not None and found.risk is not None:
-        yield replace(found.risk, before=True)
+    """Risk of the hinge nearest to a singularity, at the start and along drives."""
+    states = driven_states(model, settings, q, u, drive_times(model, settings))
+    distance = singular_distance(model, states)
+    if distance is not None and distance.risk is not None:
+        yield replace(distance.risk, before=True)

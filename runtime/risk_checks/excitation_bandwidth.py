@@ -1,4 +1,4 @@
-"""Loads and drives that are faster than the shapes that were kept of a flexible body."""
+"""Loads and drives that are faster than the shape functions of a flexible body."""
 
 from __future__ import annotations
 
@@ -18,48 +18,47 @@ if TYPE_CHECKING:
     from ..flexible.modal_body import ModalBody
     from ..integrate.settings import Settings
 
-#: Frequency of a load over that of the last shape from which on it is told.
-_FASTER = 1.5
+#: Largest accepted ratio of the frequency of a load to that of the last shape.
+_MAX_RATIO = 1.5
 
 
 def applies_to(model: CompiledScene) -> bool:
-    """Whether there are any."""
+    """Whether there are flexible bodies."""
     return bool(model.flexible)
 
 
 def excitation_bandwidth_risks(
     model: CompiledScene, settings: Settings, _: Array, __: Array
 ) -> Iterator[Risk]:
-    """Bodies whose last bending shape is slower than the fastest expression of time.  Advice: the
-    load may be small, or act on another body; the run tells what the shapes missed."""
-    known = model.packed.time_map(settings.t_start, settings.t_end)
-    shortest = float(known.longest.min(initial=np.inf))
+    """Bodies whose last bending shape is slower than the fastest expression of time.
+
+    This is information only: the load may be small, or act on another body.  The result of the run
+    estimates the truncation error of the shapes.
+    """
+    time_map = model.packed.time_map(settings.t_start, settings.t_end)
+    shortest = float(time_map.longest.min(initial=np.inf))
     for name, body in model.flexible.items() if np.isfinite(shortest) else ():
-        last = _last(body)
+        last = _last_bending_frequency(body)
         ratio = MAX_STEP_ANGLE / shortest / last if last > 0 else 0.0
-        if ratio > _FASTER:
+        if ratio > _MAX_RATIO:
             yield Risk(
-                "shapes",
-                f'"{name}"',
-                f"{known.narrowest} changes at up to {MAX_STEP_ANGLE / shortest:.3g} rad/s, "
-                f"faster than the "
-                f'last shape of "{name}" ({last:.3g} rad/s), which cannot follow',
-                "take more modes",
-                ratio,
-                _FASTER,
-                doubt=False,
-                before=True,
-            )
+                "shapes", f'"{name}"',
+                f"{time_map.narrowest} changes at up to {MAX_STEP_ANGLE / shortest:.3g} rad/s, "
+                f'faster than the last shape of "{name}" ({last:.3g} rad/s) can respond',
+                "use more modes", ratio, _MAX_RATIO, doubt=False, before=True,
+            )  # fmt: skip
 
 
 def squared_frequencies(body: ModalBody) -> Array:
-    """(n,) squared angular frequency of each shape by itself, the frame at rest, 1/s2; 0 where it
-    has no mass."""
+    """Squared angular frequencies (n,) of the single shapes in a fixed frame, rad^2/s^2.
+
+    They are 0 for shapes without mass.
+    """
     mass = modal_mass(body).diagonal()
     return np.divide(np.diag(body.K), mass, out=np.zeros(body.n), where=mass > 0)
 
 
-def _last(body: ModalBody) -> float:
-    """Angular frequency of the last bending shape, of a body without any of the last one, rad/s."""
-    bent = [k for k, name in enumerate(body.modes) if name.startswith(("y", "z"))]
-    return float(np.sqrt(np.max(squared_frequencies(body)[bent or slice(None)], initial=0.0)))
+def _last_bending_frequency(body: ModalBody) -> float:
+    """Highest angular frequency of the bending shapes, or of all shapes without any, rad/s."""
+    bending = [k for k, name in enumerate(body.modes) if name.startswith(("y", "z"))]
+    return float(np.sqrt(np.max(squared_frequencies(body)[bending or slice(None)], initial=0.0)))

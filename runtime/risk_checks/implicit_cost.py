@@ -1,8 +1,8 @@
-"""Whether an implicit method would cost less than the evaluations of an explicit run.
+"""Cost of an implicit method compared with the evaluations of an explicit run.
 
-A few steps of the implicit method, from some states of the run and with its tolerances, show how
-long its steps are; what one of them costs in evaluations is known of every engine.  No clock is
-looked at: the same run is told the same.
+Trial steps of the implicit method from some states of the run, with its tolerances, give the step
+size; the cost of a step in evaluations is a constant of each engine.  No time is measured, so that
+the finding is reproducible.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..integrate.settings import Settings
 
-#: Steps of the implicit method from each state; where they do not come to the next one, those
-#: after the third quarter say how many more there would be.
-_TRIED, _SETTLED = 60, 45
+#: Trial steps from each state.  If they do not reach the next state, the number of further steps is
+#: extrapolated from those after the first 45.
+_TRIAL_STEPS, _TRANSIENT_STEPS = 60, 45
 
-#: An implicit step in evaluations: by the looped engine, by fused code, and where the explicit run
-#: had fused code and the implicit one has none (scenes of 3 to 24 speeds).
-_LOOPED, _FUSED, _APART = 30.0, 60.0, 280.0
+#: Cost of an implicit step in evaluations: looped engine, fused code, and fused code without
+#: implicit kernels (scenes of 3 to 24 speeds).
+_LOOPED, _FUSED, _FUSED_EXPLICIT_ONLY = 30.0, 60.0, 280.0
 
-#: So much less it has to cost.
-_WORTH = 1.5
+#: Smallest reported ratio of explicit to implicit cost.
+_MIN_GAIN = 1.5
 
 
 @dataclass(frozen=True)
 class ImplicitCost:
-    """An implicit method that would cost less: its steps, and one of them in evaluations."""
+    """Implicit method of lower cost: number of its steps, and evaluations per step."""
 
     method: str
     steps: float
@@ -43,7 +43,7 @@ class ImplicitCost:
 
     @property
     def evaluations(self) -> float:
-        """All of its work, in evaluations."""
+        """Total cost in evaluations."""
         return self.steps * self.each
 
 
@@ -53,42 +53,44 @@ def implicit_cost(
     states: Sequence[tuple[float, Array, Array]],
     evaluations: float,
 ) -> ImplicitCost | None:
-    """The method that would make a run through these states (t, q, u), up to the last of them, of
-    so many evaluations, at less cost; None where it would not, or where that is not known."""
+    """Implicit method that costs less than a run of `evaluations` through some states (t, q, u).
+
+    None if it does not, or if its cost is unknown.
+    """
     steps, ends = 0.0, [t for t, _, _ in states[1:]]
     for (t, q, u), end in zip(states, ends, strict=False):
-        count = _steps(model, settings, t, end, q, u)
+        count = _step_count(model, settings, t, end, q, u)
         if count is None:
             return None
         steps += count
-    found = ImplicitCost(implicit_method(settings.rtol), steps, _each(model))
-    return found if _WORTH * found.evaluations < evaluations else None
+    cost = ImplicitCost(implicit_method(settings.rtol), steps, _evaluations_per_step(model))
+    return cost if _MIN_GAIN * cost.evaluations < evaluations else None
 
 
-def _steps(
+def _step_count(
     model: CompiledScene, settings: Settings, t: float, end: float, q: Array, u: Array
 ) -> float | None:
-    """Implicit steps from a state to a time; None where there are none."""
+    """Estimated number of implicit steps from a state to a time; None if it is unknown."""
     method = implicit_method(settings.rtol)
-    tried = replace(
-        settings, t_start=t, t_end=end, method=method, output_times=None, max_steps=_TRIED,
+    trial = replace(
+        settings, t_start=t, t_end=end, method=method, output_times=None, max_steps=_TRIAL_STEPS,
         tangent="auto",
     )  # fmt: skip
     try:
-        run = first_run(model, tried, q, u, RunMonitor(None, tried))
+        run = first_run(model, trial, q, u, RunMonitor(None, trial))
     except MstmmError:  # a scene without tangent
         return None
-    made = len(run.t) - 1
+    count = len(run.t) - 1
     if run.success:
-        return float(made)
-    if made <= _SETTLED:
+        return float(count)
+    if count <= _TRANSIENT_STEPS:
         return None
-    pace = (run.t[-1] - run.t[_SETTLED]) / (made - _SETTLED)
-    return float(made + (end - run.t[-1]) / pace)
+    mean_step = (run.t[-1] - run.t[_TRANSIENT_STEPS]) / (count - _TRANSIENT_STEPS)
+    return float(count + (end - run.t[-1]) / mean_step)
 
 
-def _each(model: CompiledScene) -> float:
+def _evaluations_per_step(model: CompiledScene) -> float:
     fusion = model.fusion
     if fusion.library is None:
         return _LOOPED
-    return _APART if fusion.implicit is None else _FUSED
+    return _FUSED_EXPLICIT_ONLY if fusion.implicit is None else _FUSED

@@ -1,4 +1,4 @@
-"""Closed loops whose rows repeat each other but for a small gap."""
+"""Closed loops with constraint rows that are redundant except for a small position gap."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ MISFIT_REMEDY = (
 
 
 def applies_to(model: CompiledScene) -> bool:
-    """Whether rows that are left out leave more than rounding."""
+    """Whether omitted redundant rows have a gap above rounding."""
     return model.closed is not None and model.closed.loops.misfit[0] > 0.0
 
 
 def loop_misfit_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
-    """What such a row asks is left out, for met exactly it would lock."""
+    """Risk of the omitted row with the largest gap."""
     assert model.closed is not None
     gap, name, direction = model.closed.loops.misfit
     yield Risk(

@@ -1,4 +1,4 @@
-"""Digits that the sweep loses at the start: heavy bodies behind light ones."""
+"""Loss of digits in the sweep at the start: heavy bodies outboard of light ones."""
 
 from __future__ import annotations
 
@@ -19,48 +19,50 @@ if TYPE_CHECKING:
 
     from ..engine.compiled_scene import CompiledScene
 
-#: The loss is at most so many times the ratio of masses, or of moments of inertia.
-_WORST = 1e3
+#: Largest ratio of the loss to the ratio of masses, or of moments of inertia.
+_MAX_LOSS_PER_RATIO = 1e3
 
-#: Bodies up to which it is looked at: more take longer than many a run.
-_MOST = 2000
+#: Largest number of bodies that are checked; more would take longer than typical runs.
+_MAX_BODIES = 2000
 
 
 def applies_to(model: CompiledScene) -> bool:
-    """Whether masses are so unlike that digits may be lost."""
-    if model.packed.qr or model.packed.system.closes:
+    """Whether mass ratios are so large that digits may be lost."""
+    if model.packed.qr or model.packed.system.closes or len(model.scene.bodies) > _MAX_BODIES:
         return False
-    return len(model.scene.bodies) <= _MOST and _WORST * _unlike(model.scene) >= MAX_PIVOT_LOSS
+    return _MAX_LOSS_PER_RATIO * _max_mass_ratio(model.scene) >= MAX_PIVOT_LOSS
 
 
 def mass_ratio_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
-    """The worst loss of the start's sweep."""
-    found = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
-    if found is not None and found.risk is not None:
-        yield replace(found.risk, before=True)
+    """Risk of the largest loss of digits in the sweep at the start."""
+    loss = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
+    if loss is not None and loss.risk is not None:
+        yield replace(loss.risk, before=True)
 
 
 def accurate_sweep(model: CompiledScene) -> str:
-    """Of a model made with "riccati" the cheapest sweep by which its start keeps its digits:
-    "riccati", "refined" or "qr"."""
+    """Cheapest accurate sweep at the start: "riccati", "refined" or "qr".
+
+    The model must have been compiled with "riccati".
+    """
     if not applies_to(model):
         return "riccati"
     packed, settings = model.packed, Settings(0.0)
     q, u = start_values(packed.scene, packed.layout, packed.flexible)
-    found = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
-    return "riccati" if found is None or found.risk is None else found.sweep
+    loss = pivot_loss(model, driven_states(model, settings, q, u, [settings.t_start]))
+    return "riccati" if loss is None or loss.risk is None else loss.sweep
 
 
-def _unlike(scene: Scene) -> float:
-    """The largest ratio of two masses, and of two moments of inertia."""
+def _max_mass_ratio(scene: Scene) -> float:
+    """Largest ratio of two masses or of two moments of inertia."""
     tables = [*scene.body, *(table for chain in scene.chain for table in chain.body)]
     masses = [table.mass for table in tables]
     masses += [beam.mass for beam in scene.beam]
-    return max(_ratio(masses), _ratio(x for table in tables for x in table.inertia[:3]))
+    return max(_max_ratio(masses), _max_ratio(x for table in tables for x in table.inertia[:3]))
 
 
-def _ratio(values: Iterable[float]) -> float:
-    there = [value for value in values if value > 0]
-    return max(there) / min(there) if there else 1.0
+def _max_ratio(values: Iterable[float]) -> float:
+    positive = [value for value in values if value > 0]
+    return max(positive) / min(positive) if positive else 1.0

@@ -1,4 +1,4 @@
-"""Risks that are seen before a run: in its scene, its settings, and its start."""
+"""Risks found before a run: in its scene, settings and initial state."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from ..run.trajectory import Trajectory
 
 
-Guard = Callable[["CompiledScene", "Settings", Array, Array], Iterable[Risk]]
+Check = Callable[["CompiledScene", "Settings", Array, Array], Iterable[Risk]]
 
-#: Whether a scene gives reason to look, and what looks.
-_GUARDS: tuple[tuple[Callable[[CompiledScene], bool], Guard], ...] = (
+#: (whether a check applies to a model, check).
+_CHECKS: tuple[tuple[Callable[[CompiledScene], bool], Check], ...] = (
     (mass_ratio.applies_to, mass_ratio.mass_ratio_risks),
     (coordinate_singularity.applies_to, coordinate_singularity.coordinate_singularity_risks),
     (spin_stiffening.has_linear_bodies, spin_stiffening.spin_stiffening_risks),
@@ -40,21 +40,25 @@ _GUARDS: tuple[tuple[Callable[[CompiledScene], bool], Guard], ...] = (
     (loop_misfit.applies_to, loop_misfit.loop_misfit_risks),
 )
 
-#: The guards that the scene of a model gives reason for, found before its first run.
-_concerned: WeakKeyDictionary[CompiledScene, tuple[Guard, ...]] = WeakKeyDictionary()
+#: Checks that apply to a model, found before its first run.
+_applicable_checks: WeakKeyDictionary[CompiledScene, tuple[Check, ...]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
 class PreRunFindings:
-    """What is known of a run of a model at its start: risks, but for that of its fixed step, which
-    the result knows; whether its user wants to be told of them."""
+    """Findings before a run of a model.
+
+    Attributes:
+        risks: without that of a fixed step, which the result adds.
+        told: whether the user is warned of them.
+    """
 
     model: CompiledScene
     risks: Iterable[Risk]
     told: bool = True
 
     def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
-        """The run from (nq,), (nu,) with what was known of it, and what its steps tell."""
+        """Attach these findings, and those of its steps, to the run from q (nq,), u (nu,)."""
         risks = DeferredRisks(
             lambda: (*self.risks, *run.risks, *stiffness.stability_limited_risks(self.model, run))
         )
@@ -64,14 +68,14 @@ class PreRunFindings:
 def check_before_run(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> PreRunFindings:
-    """Look at a run from (nq,), (nu,) before it is made.
+    """Check a run from q (nq,), u (nu,) before it starts.
 
-    Raises SceneError for settings that no run can have.
+    Raises SceneError for invalid settings.
     """
-    if model not in _concerned:
-        _concerned[model] = tuple(guard for concerns, guard in _GUARDS if concerns(model))
-    guards, known = _concerned[model], unmapped_expression_notes(model.packed, settings)
-    found = DeferredRisks(
-        lambda: (*known, *(x for guard in guards for x in guard(model, settings, q, u)))
+    if model not in _applicable_checks:
+        _applicable_checks[model] = tuple(check for applies, check in _CHECKS if applies(model))
+    checks, notes = _applicable_checks[model], unmapped_expression_notes(model.packed, settings)
+    risks = DeferredRisks(
+        lambda: (*notes, *(risk for check in checks for risk in check(model, settings, q, u)))
     )
-    return PreRunFindings(model, found)
+    return PreRunFindings(model, risks)

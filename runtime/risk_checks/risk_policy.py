@@ -1,4 +1,4 @@
-"""`on_risk`: what a run does about its risks."""
+"""Option `on_risk`: the reaction of a run to its risks."""
 
 from __future__ import annotations
 
@@ -23,45 +23,45 @@ if TYPE_CHECKING:
 def check_start(
     model: CompiledScene, settings: Settings, q: Array, u: Array, on_risk: str
 ) -> PreRunFindings:
-    """What is seen before a run from (nq,), (nu,).
+    """Check the start of a run from q (nq,), u (nu,).
 
-    Raises SceneError for a word that `on_risk` does not know, RiskRefused where that is "refuse"
-    and something speaks against the run.
+    Raises SceneError for an unknown value of `on_risk`, RiskRefused if it is "refuse" and a risk is
+    an objection.
     """
-    known = f"one of {', '.join(ON_RISK)}"
-    if require_word("on_risk", on_risk, known) not in ON_RISK:
-        raise SceneError(f"on_risk = {on_risk!r}: expected {known}")
-    seen = check_before_run(model, settings, q, u)
+    options = f"one of {', '.join(ON_RISK)}"
+    if require_word("on_risk", on_risk, options) not in ON_RISK:
+        raise SceneError(f"on_risk = {on_risk!r}: expected {options}")
+    findings = check_before_run(model, settings, q, u)
     if on_risk == "refuse":
         step = check_step(model.looped, settings, q, u)
-        own = () if step is None or step.risk is None else (step.risk,)
-        _refuse((*model.scene.risks, *own, *seen.risks), "before the run")
-    return seen if on_risk != "ignore" else replace(seen, told=False)
+        step_risks = () if step is None or step.risk is None else (step.risk,)
+        _reject_objections((*model.scene.risks, *step_risks, *findings.risks), "before the run")
+    return findings if on_risk != "ignore" else replace(findings, told=False)
 
 
 def apply_policy(result: Result, on_risk: str) -> Result:
-    """The result of a run.
+    """Return the result of a run, unless `on_risk` rejects it.
 
-    Raises RiskRefused, which carries it, where `on_risk` is "refuse" and something speaks against
-    the numbers of a run that reached its end.
+    Raises RiskRefused, which carries the result, if `on_risk` is "refuse", the run has reached its
+    end and a risk is an objection.
     """
     if on_risk == "refuse" and result.success:
         try:
             risks = result.risks
         except KeyboardInterrupt as stopped:
             raise RiskRefused(
-                'the run ended, but the look at its risks was interrupted (on_risk = "refuse")', [],
+                'run finished, but the check of its risks was interrupted (on_risk = "refuse")', [],
                 result,
             ) from stopped  # fmt: skip
-        _refuse(risks, "in what it gave", result)
+        _reject_objections(risks, "in the result", result)
     return result
 
 
-def _refuse(risks: Iterable[Risk], where: str, result: Result | None = None) -> None:
-    against = [risk for risk in risks if risk.doubt]
-    if against:
-        said = "\n".join(f"  {risk.name}: {risk}" for risk in against)
+def _reject_objections(risks: Iterable[Risk], where: str, result: Result | None = None) -> None:
+    """Raise RiskRefused if one of the risks is an objection."""
+    objections = [risk for risk in risks if risk.doubt]
+    if objections:
+        rows = "\n".join(f"  {risk.name}: {risk}" for risk in objections)
         raise RiskRefused(
-            f'the run is refused (on_risk = "refuse") for what was seen {where}:\n{said}', against,
-            result,
-        )  # fmt: skip
+            f'run rejected (on_risk = "refuse"), risks found {where}:\n{rows}', objections, result
+        )

@@ -1,4 +1,4 @@
-"""Frequencies beyond those up to which the shapes of flexible bodies hold."""
+"""Frequencies beyond the valid range of the shape functions of flexible bodies."""
 
 from __future__ import annotations
 
@@ -18,27 +18,31 @@ from ..flexible.beam_resolution import beam_resolution
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
 
-#: How far beyond its limit, and what share of the strain energy of a motion makes it one of a body.
-_BEYOND, _SHARE = 1.05, 0.1
-_REMEDY = "take more modes"
+#: Accepted ratio of a frequency to the limit, and share of the strain energy of a mode from which
+#: on a body matters.
+_TOLERANCE, _MIN_ENERGY_SHARE = 1.05, 0.1
+_REMEDY = "use more modes"
 
-_known: WeakKeyDictionary[CompiledScene, Mapping[str, float]] = WeakKeyDictionary()
+_limits_by_model: WeakKeyDictionary[CompiledScene, Mapping[str, float]] = WeakKeyDictionary()
 
 
 def shape_limits(model: CompiledScene) -> Mapping[str, float]:
-    """Flexible body -> frequency in rad/s up to which its shapes hold with its ends as the scene
-    has them; without those that no shapes of theirs limit."""
-    if model not in _known:
-        _known[model] = dict(_limits(model))
-    return _known[model]
+    """Flexible body -> largest frequency that its shapes resolve, rad/s, if it is limited.
+
+    The limit depends on the boundary conditions at its ends in the scene.
+    """
+    if model not in _limits_by_model:
+        _limits_by_model[model] = dict(_compute_limits(model))
+    return _limits_by_model[model]
 
 
-def _limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
+def _compute_limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
     beams = {beam.name: beam for beam in model.scene.beam}
-    around, alike = BeamEnvironment(model.scene) if beams else None, dict[str, float]()
+    environment = BeamEnvironment(model.scene) if beams else None
+    limits_by_beam = dict[str, float]()  # equal beams share one computation
     for name, body in model.flexible.items():
         limit = body.resolved
-        if body.shapes is not None and name in beams and around is not None:
+        if body.shapes is not None and name in beams and environment is not None:
             beam, data = beams[name], body.shapes.data
             held = boundary_conditions(around, beam, beam_data(beam))
             key = repr((beam.model_copy(update={"name": ""}), held, body.modes))
@@ -52,18 +56,20 @@ def _limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
 def response_range_risks(
     model: CompiledScene, omega: Array, exact: Collection[str] = ()
 ) -> Iterator[Risk]:
-    """Bodies whose shapes do not hold up to the highest of the frequencies omega (k,) in rad/s of a
-    response; those of the names `exact` need none."""
+    """Bodies whose shapes do not resolve the highest frequency omega (k,), rad/s, of a response.
+
+    Bodies named in `exact` are computed without shapes.
+    """
     highest = float(omega.max(initial=0.0))
     limits = {name: x for name, x in shape_limits(model).items() if name not in exact}
-    short = sorted((x, name) for name, x in limits.items() if highest > _BEYOND * x)
-    if short:
-        limit, name = short[0]
+    exceeded = sorted((x, name) for name, x in limits.items() if highest > _TOLERANCE * x)
+    if exceeded:
+        limit, name = exceeded[0]
         yield Risk(
             "frequency-range", f'"{name}"',
-            f"the response is asked for up to {_hertz(highest):.5g} Hz, but the shapes of "
-            f'"{name}" hold up to {_hertz(limit):.5g} Hz{_others(len(short) - 1)}',
-            f"{_REMEDY}, or exact = True for beams that are uniform",
+            f"the response is requested up to {_hertz(highest):.5g} Hz, but the shapes of "
+            f'"{name}" are valid up to {_hertz(limit):.5g} Hz{_others(len(exceeded) - 1)}',
+            f"{_REMEDY}, or exact = True for uniform beams",
             _hertz(highest), _hertz(limit), "Hz",
         )  # fmt: skip
 
@@ -71,23 +77,25 @@ def response_range_risks(
 def motion_range_risks(
     model: CompiledScene, omega: Array, strain: Mapping[str, Array]
 ) -> Iterator[Risk]:
-    """Bodies that hold more than a tenth of the strain energy of motions of frequencies omega (k,)
-    in rad/s beyond those up to which their shapes hold; `strain`, its parts (k,) by body."""
-    limits, found = shape_limits(model), list[tuple[float, str, Array]]()
-    for name, limit in limits.items():
-        parts = np.nan_to_num(strain.get(name, np.zeros(len(omega))))
-        places = np.flatnonzero((omega > _BEYOND * limit) & (np.abs(parts) > _SHARE))
-        if len(places):
-            found.append((limit, name, omega[places]))
-    if found:
-        limit, name, beyond = min(found, key=lambda one: one[:2])
-        few = f"{len(beyond)} motions" if len(beyond) > 1 else "a motion"
+    """Bodies that matter in modes of frequencies omega (k,), rad/s, beyond their valid range.
+
+    `strain` are their shares (k,) of the strain energy of each mode.
+    """
+    exceeded = list[tuple[float, str, Array]]()
+    for name, limit in shape_limits(model).items():
+        shares = np.nan_to_num(strain.get(name, np.zeros(len(omega))))
+        invalid = (omega > _TOLERANCE * limit) & (np.abs(shares) > _MIN_ENERGY_SHARE)
+        if invalid.any():
+            exceeded.append((limit, name, omega[invalid]))
+    if exceeded:
+        limit, name, frequencies = min(exceeded, key=lambda row: row[:2])
+        modes = f"{len(frequencies)} modes" if len(frequencies) > 1 else "a mode"
         yield Risk(
             "frequency-range", f'"{name}"',
-            f"{few} from {_hertz(beyond.min()):.5g} Hz on cannot be trusted: the shapes of "
-            f'"{name}" hold up to {_hertz(limit):.5g} Hz{_others(len(found) - 1)}',
-            f"{_REMEDY}, or ask for the slowest modes alone, modes(count)",
-            _hertz(beyond.max()), _hertz(limit), "Hz",
+            f"{modes} from {_hertz(frequencies.min()):.5g} Hz on cannot be trusted: the shapes of "
+            f'"{name}" are valid up to {_hertz(limit):.5g} Hz{_others(len(exceeded) - 1)}',
+            f"{_REMEDY}, or compute the lowest modes only, modes(count)",
+            _hertz(frequencies.max()), _hertz(limit), "Hz",
         )  # fmt: skip
 
 
@@ -96,4 +104,4 @@ def _hertz(omega: float) -> float:
 
 
 def _others(count: int) -> str:
-    return f" (and {count} more bodies likewise)" if count else ""
+    return f" (as for {count} more bodies)" if count else ""

@@ -1,4 +1,4 @@
-"""Mechanisms that begin where their motion branches."""
+"""Mechanisms that start in a singular configuration, where their motion is not unique."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def applies_to(model: CompiledScene) -> bool:
-    """Whether loops begin in a singular pose, and speeds of some hinges are not given."""
+    """Whether loops start in a singular configuration with some initial speeds not given."""
     if model.closed is None or not model.closed.loops.singular:
         return False
     hinges = [hinge for hinge in model.packed.described.hinge if not hinge.is_weld]
@@ -26,15 +26,15 @@ def applies_to(model: CompiledScene) -> bool:
 def singular_start_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
-    """There the start's speeds decide, and few of them do not say which way."""
+    """Risk that the given initial speeds do not determine the motion."""
     assert model.closed is not None
     if not np.array_equal(q, model.closed.start[0]):
         return
     hinge = model.closed.loops.redundant[0][0]
     yield Risk(
         "branching-start", f'hinge "{hinge}"',
-        "the loops begin in a singular pose, from which the mechanism can go on in more ways than "
-        "one; speeds that are not all given may belong to none of them",
-        "give the speeds of all hinges (initial.u) as they are on the way that is meant, or begin "
-        "elsewhere", before=True,
+        "the loops start in a singular configuration, where the motion is not unique; if only some "
+        "speeds are given, they may be compatible with no motion",
+        "give the speeds of all hinges (initial.u) for the intended motion, or start in another "
+        "configuration", before=True,
     )  # fmt: skip

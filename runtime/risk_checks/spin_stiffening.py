@@ -1,8 +1,9 @@
-"""Linear flexible bodies that will be spun: by their start, and by drives over the whole run.
+"""Spin of linear flexible bodies, which lack geometric stiffness, at the start or by drives.
 
-In the axes of a linear beam spin takes of its stiffness what shortening would more than give back;
-of a clamped one in the plane of its spin about (spin / first frequency)^2 (Kane, Ryan, Banerjee,
-Journal of Guidance, Control, and Dynamics 10, 1987).
+In the axes of a linear beam, spin reduces the stiffness, while the neglected foreshortening would
+increase it by more.  For a clamped beam in the plane of its spin the relative reduction is about
+(spin / first frequency)^2 (Kane, Ryan, Banerjee, Journal of Guidance, Control, and Dynamics 10,
+1987).
 """
 
 from __future__ import annotations
@@ -26,21 +27,21 @@ if TYPE_CHECKING:
 
 
 def has_linear_bodies(model: CompiledScene) -> bool:
-    """Whether there are any."""
-    return bool(_linear(model))
+    """Whether there are linear flexible bodies."""
+    return bool(_linear_bodies(model))
 
 
-def _linear(model: CompiledScene) -> list[str]:
+def _linear_bodies(model: CompiledScene) -> list[str]:
     return [name for name, body in model.flexible.items() if not has_second_order_terms(body)]
 
 
 def spin_stiffening_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
-    """Those whose stiffness a spin that is known before the run changes by more than GAMMA."""
-    moved = driven_states(model, settings, q, u, drive_times(model, settings))
-    bodies = FlexibleBodies(model, Observations(model, moved))
-    for name in _linear(model):
+    """Linear bodies whose stiffness changes too much by a spin that is known before the run."""
+    states = driven_states(model, settings, q, u, drive_times(model, settings))
+    bodies = FlexibleBodies(model, Observations(model, states))
+    for name in _linear_bodies(model):
         first = float(modal_frequencies(model.flexible[name])[0])
         spin = transverse_spin(bodies.motion(name))
         ratio = spin / first if first > 0 else 0.0
@@ -48,6 +49,6 @@ def spin_stiffening_risks(
             yield Risk(
                 "stiffening", f'"{name}"',
                 f'"{name}" has no geometric stiffening and will spin at {ratio:.2g} times its '
-                f"first frequency: its stiffness errs by about {min(ratio**2, 9.99):.0%}",
+                f"first frequency: stiffness error about {min(ratio**2, 9.99):.0%}",
                 "leave stiffening on", ratio, MAX_LOAD_RATIO**0.5, before=True,
             )  # fmt: skip

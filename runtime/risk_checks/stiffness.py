@@ -1,5 +1,4 @@
-"""Laws and modes so fast that an explicit method needs very many steps, where an implicit one would
-cost less."""
+"""Stiff scenes: an explicit method is limited by stability, and an implicit one costs less."""
 
 from __future__ import annotations
 
@@ -23,94 +22,94 @@ if TYPE_CHECKING:
     from ..integrate.settings import Settings
     from ..run.trajectory import Trajectory
 
-#: |lambda| times the time of a run from which on it is looked at before it is made.
-_MANY = 2e4
+#: |lambda| times the duration of a run from which on it is checked before it starts.
+_MIN_ROTATION = 2e4
 
-#: Parts of a run, of which the beginnings are made by an implicit method behind it.
-_PARTS = 4
+#: Number of states of a finished run from which the implicit method is tried.
+_TRIALS = 4
 
 
 def applies_to(model: CompiledScene) -> bool:
-    """Whether there are any."""
-    return _may_be(model, 0.0)
+    """Whether there are laws or shapes that may be stiff."""
+    return _may_be_fast(model, 0.0)
 
 
-def _may_be(model: CompiledScene, rate: float) -> bool:
-    """Whether laws or shapes may move as fast as that, 1/s."""
+def _may_be_fast(model: CompiledScene, rate: float) -> bool:
+    """Whether laws or shapes may move faster than a rate, 1/s."""
     fast = (
         squared_frequencies(body).max(initial=0.0) > rate * rate for body in model.flexible.values()
     )
     return may_be_fast(model.scene, rate) or any(fast)
 
 
-def _chooses_explicit_steps(settings: Settings) -> bool:
-    """Adaptive steps of an explicit method that was asked for by name."""
+def _is_adaptive_explicit(settings: Settings) -> bool:
+    """Whether a run has adaptive steps of an explicit method that was requested by name."""
     others = (AUTO, *classical_run.METHODS, *external_integrators.METHODS)
-    return settings.step is None and settings.method not in others and not _implicit(settings)
+    if settings.step is not None or settings.method in others:
+        return False
+    return not get(settings.method).implicit
 
 
-def _implicit(settings: Settings) -> bool:
-    return get(settings.method).implicit
-
-
-# --- before ---------------------------------------------------------------------------------------
+# --- before a run ---------------------------------------------------------------------------------
 
 
 def explicit_step_count_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
-    """That the fastest motion of the start will hold the steps back."""
+    """Risk that the fastest motion at the start limits the steps of the run."""
     method, span = settings.method, settings.t_end - settings.t_start
-    if not _chooses_explicit_steps(settings):
+    if not _is_adaptive_explicit(settings):
         return
-    if not (span > 0 and _may_be(model, _MANY / span)):
+    if not (span > 0 and _may_be_fast(model, _MIN_ROTATION / span)):
         return
     try:
         rate = fastest_at_start(model.looped, settings.t_start, q, u)
-    except MstmmError:  # a scene without tangent, or a start that the run itself will blame
+    except MstmmError:  # a scene without tangent, or an invalid start, which the run reports
         return
-    if not rate * span > _MANY:
+    if not rate * span > _MIN_ROTATION:
         return
     tableau = get(method)
     steps = rate * span / tableau.real_stability_limit
     evaluations = steps * len(tableau.B)
     ends = [(settings.t_start, q, u), (settings.t_end, q, u)]
-    found = implicit_cost(model, settings, ends, evaluations)
-    if found is not None:
+    cost = implicit_cost(model, settings, ends, evaluations)
+    if cost is not None:
         means = (
-            f"springs, dampers or shapes move at {rate:.2g} 1/s, which holds {method} to about "
+            f"springs, dampers or shapes move at {rate:.2g} 1/s, which limits {method} to about "
             f"{steps:.1g} steps in {span:.3g} s"
         )
-        yield _stiff(means, found, evaluations, True)
+        yield _stiff_risk(means, cost, evaluations, True)
 
 
-# --- behind ---------------------------------------------------------------------------------------
+# --- after a run ----------------------------------------------------------------------------------
 
 
 def stability_limited_risks(model: CompiledScene, run: Trajectory) -> Iterator[Risk]:
-    """That stability has set many steps of a run.  Not told of scenes with memory, whose states
-    alone do not say how they go on."""
-    settings, counted = run.settings, run.statistics
-    if not (_chooses_explicit_steps(settings) and counted.stability_limited):
+    """Risk that stability has limited many steps of a run.
+
+    Scenes with memory are not checked, because a run cannot restart from their states alone.
+    """
+    settings, statistics = run.settings, run.statistics
+    if not (_is_adaptive_explicit(settings) and statistics.stability_limited):
         return
-    if model.packed.system.remembers or len(run.t) <= _PARTS or not np.isfinite(run.q).all():
+    if model.packed.system.remembers or len(run.t) <= _TRIALS or not np.isfinite(run.q).all():
         return
-    places = np.unique(np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], _PARTS + 1)))
-    states = [(float(run.t[k]), run.q[k], run.u[k]) for k in places]
-    found = implicit_cost(model, settings, states, counted.evaluations)
-    if found is not None:
+    indices = np.unique(np.searchsorted(run.t, np.linspace(run.t[0], run.t[-1], _TRIALS + 1)))
+    states = [(float(run.t[k]), run.q[k], run.u[k]) for k in indices]
+    cost = implicit_cost(model, settings, states, statistics.evaluations)
+    if cost is not None:
         means = (
-            f"of {counted.steps} steps {counted.stability_limited_steps} were as long as the "
-            f"stability of {settings.method} allows: the scene is stiff for it"
+            f"stability of {settings.method} limited {statistics.stability_limited_steps} of "
+            f"{statistics.steps} steps: the scene is stiff for this method"
         )
-        yield _stiff(means, found, counted.evaluations, False)
+        yield _stiff_risk(means, cost, statistics.evaluations, False)
 
 
-def _stiff(means: str, found: ImplicitCost, evaluations: float, before: bool) -> Risk:
+def _stiff_risk(means: str, cost: ImplicitCost, evaluations: float, before: bool) -> Risk:
     return Risk(
         "stiff", RUN, means,
-        f'take method = "{found.method}": by a look at some of its steps it needs about '
-        f"{found.steps:.0f}, each the work of {found.each:g} evaluations, which is "
-        f"{max(found.evaluations / evaluations, 0.01):.0%} of the cost",
-        evaluations, found.evaluations, "evaluations", doubt=False, before=before,
+        f'use method = "{cost.method}": according to trial steps it needs about '
+        f"{cost.steps:.0f} steps of {cost.each:g} evaluations each, "
+        f"{max(cost.evaluations / evaluations, 0.01):.0%} of the cost",
+        evaluations, cost.evaluations, "evaluations", doubt=False, before=before,
     )  # fmt: skip

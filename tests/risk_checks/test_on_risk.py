@@ -91,7 +91,7 @@ def test_a_run_that_is_refused_behind_its_end_is_kept() -> None:
     model = swinging()
     told = model.simulate(5.0, **COARSE)
     assert [risk.name for risk in told.risks] == ["energy-drift"]
-    with pytest.raises(mstmm.RiskRefused, match=r"in what it gave:\n  energy-drift: ") as seen:
+    with pytest.raises(mstmm.RiskRefused, match=r"in the result:\n  energy-drift: ") as seen:
         model.simulate(5.0, **COARSE, on_risk="refuse")
     kept = seen.value.result
     np.testing.assert_array_equal(kept.q, told.q)
