@@ -75,7 +75,7 @@ def parameter_derivatives(
 def _with_rows(system: System, judged: System) -> System:
     """System with the constraint rows of another one."""
     pairs = zip(system.closures, judged.closures, strict=True)
-    closures = tuple(replace(one, directions=other.directions) for one, other in pairs)
+    closures = tuple(replace(closure, directions=other.directions) for closure, other in pairs)
     return replace(system, closures=closures, couplings=judged.couplings)
 
 

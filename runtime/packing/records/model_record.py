@@ -83,13 +83,13 @@ def write_model(system: System, elements: Elements) -> Written:
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)
-    behind, loops = attach_loops(model, system, memory, lib, bodies.end)
+    offset, loops = attach_loops(model, system, memory, lib, bodies.end)
     axes = motion_plane(system, elements)
     if loops is not None and axes is not None:
-        behind = attach_planar_bodies(
-            model, system, elements, memory, lib, loops.of_bodies, axes, behind
+        offset = attach_planar_bodies(
+            model, system, elements, memory, lib, loops.of_bodies, axes, offset
         )
-    scratch = attach_runs(model, system, memory, lib, behind)
+    scratch = attach_runs(model, system, memory, lib, offset)
     modal = bodies.modal
     return Written(
         model,
