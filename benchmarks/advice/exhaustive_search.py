@@ -24,8 +24,8 @@ from mstmm.runtime.advice.body_model_levels import (
 from mstmm.runtime.advice.measure_renaming import Renaming
 from mstmm.runtime.chart.error_measure import Places
 from mstmm.runtime.chart.method_families import PROMISING
-from mstmm.runtime.chart.model_levels import Variant, ladder, with_tables
-from mstmm.runtime.chart.planar_model import planar
+from mstmm.runtime.chart.model_levels import Variant, model_levels, with_tables
+from mstmm.runtime.chart.planar_model import planar_level
 from mstmm.runtime.result.flexible.modal_energy import modal_frequencies
 from mstmm.runtime.result.one_way.result import OneWayResult
 
@@ -94,14 +94,14 @@ def single(model: mstmm.Model, t_end: float, method: str, rtol: float) -> Any:
 
 def truth(scene: mstmm.Scene, t_end: float) -> Truth | None:
     """The richest model by two methods that agree best; None where no two reach the end."""
-    top = ladder(scene)[-1]
+    top = model_levels(scene)[-1]
     model = mstmm.compile(top.scene, engine="looped")
     measure = Renaming(Places(model, model.simulate(0.0)))
     found = _agreed(model, measure, t_end)
     if found is None:
         return None
     error, numbers, q = found
-    flat = planar(Variant("richest", top.scene), model, q)
+    flat = planar_level(Variant("richest", top.scene), model, q)
     return Truth(numbers, error, measure, top.scene if flat is None else flat.scene)
 
 

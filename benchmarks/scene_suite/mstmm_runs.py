@@ -10,9 +10,9 @@ import numpy as np
 
 import mstmm
 from mstmm.runtime.chart.chart_points import Point, Reference, Setting, Skipped
-from mstmm.runtime.chart.error_measure import measure_of
-from mstmm.runtime.chart.method_families import FAMILIES, PROMISING, every_method, family
-from mstmm.runtime.chart.method_survey import Survey, curve
+from mstmm.runtime.chart.error_measure import select_measure
+from mstmm.runtime.chart.method_families import FAMILIES, PROMISING, all_methods, family
+from mstmm.runtime.chart.method_survey import Survey, method_curve
 from mstmm.runtime.chart.reference_solution import compute_reference
 from mstmm.runtime.chart.time_budget import EARLY, SETTINGS, Budget
 from mstmm.runtime.chart.trial_run import Runs
@@ -60,15 +60,15 @@ def surveyed(
     budget = Budget(seconds)
     runs = Runs(case.t_end, np.array([case.t_end]), budget)
     start = model.simulate(0.0, method="dop853")
-    distance = measure_of(model, start, [f"{case.watched[-1]}.position"], False)
+    distance = select_measure(model, start, [f"{case.watched[-1]}.position"], False)
     best = compute_reference(model, LOOPED, distance, runs, _quiet)
     reference = Reference(
         best.error, best.made_by, LOOPED, distance.name, distance.unit, distance.scaling
     )
     say(f"{case.name}: reference good to {best.error:.1e} m after {budget.spent:.0f} s")
     curves = [
-        curve(name, engine, one, case.t_end, reference.floor, None)
-        for name in methods or every_method()
+        method_curve(name, engine, one, case.t_end, reference.floor, None)
+        for name in methods or all_methods()
         if family(name) not in OTHERS
         for engine, one in models.items()
     ]
@@ -95,7 +95,7 @@ def shortest_call(own: Own, case: Case) -> float:
 
 def _warm(model: mstmm.Model, t_end: float) -> None:
     """Short runs of all kinds of methods, which compile and load what those need."""
-    for name in every_method():
+    for name in all_methods():
         if family(name) not in OTHERS:
             with suppress(mstmm.MstmmError):
                 model.simulate(t_end, method=name, output_times=[t_end], max_steps=2)

@@ -13,7 +13,7 @@ import numpy as np
 
 from mstmm.errors import MstmmError
 from mstmm.runtime.chart.chart_points import Point, Reference, Setting
-from mstmm.runtime.chart.pareto_front import bound_errors, front, recommend
+from mstmm.runtime.chart.pareto_front import bound_errors, pareto_front, recommend
 
 from ..common import measure
 from ..stiff.cases import Case
@@ -60,7 +60,7 @@ def compared(case: Case, limits: Limits, with_peers: bool, say: Callable[[str], 
         calls |= {setting: run for setting, (_, run) in found.items()}
         say(f"{case.name}: {curve.tool}, {curve.manner}: {len(found)} settings")
     known = {tool: bound_errors(some, reference) for tool, some in points.items()}
-    fronts = {tool: front(some, reference.floor) for tool, some in known.items()}
+    fronts = {tool: pareto_front(some, reference.floor) for tool, some in known.items()}
     best = timed(fronts, calls, limits.rounds)
     return {
         "case": case.name, "title": case.title, "t_end_s": case.t_end, "of": case.watched[-1],

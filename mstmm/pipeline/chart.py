@@ -64,9 +64,11 @@ def chart(
     Raises SceneError for invalid arguments, NumericalFailure if no reference is found within its
     part of the budget.
     """
-    from ..runtime.chart.build_chart import make_chart, request
+    from ..runtime.chart.build_chart import chart_request, make_chart
 
-    request_options = request(t_end, quantities, methods, models, error, budget, samples, rounds)
+    request_options = chart_request(
+        t_end, quantities, methods, models, error, budget, samples, rounds
+    )
 
     engine_name = "looped" if models and engine == "auto" else engine
 

@@ -12,7 +12,7 @@ from mstmm.errors import MstmmError
 
 from ..chart.chart_points import Setting
 from ..chart.error_measure import Places
-from ..chart.model_levels import at_level
+from ..chart.model_levels import with_model_level
 from ..chart.time_budget import Budget, OutOfTime
 from ..chart.trial_run import Runs
 from ..integrate.steppers import AUTO
@@ -89,7 +89,7 @@ class AdviceState:
         runs = Runs(self.asked.t_end, times, self.budget)
         setting = Setting(AUTO, "one-way", first_rtol(self.asked.error))
         try:
-            model = self.compile(at_level(scene, "one-way"))
+            model = self.compile(with_model_level(scene, "one-way"))
             return runs.simulate(model, setting, _FIRST * self.budget.left())[0]
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None

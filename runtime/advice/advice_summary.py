@@ -11,7 +11,7 @@ from mstmm.defaults import METHOD, RTOL
 from mstmm.safe_text import abbreviate_names
 
 from ..chart.chart_points import Point, Setting
-from ..chart.trial_run import error_of
+from ..chart.trial_run import max_error
 from ..integrate.steppers import AUTO
 from .advice import Advice, BodyAdvice, TriedModel
 from .advice_state import AdviceState
@@ -94,7 +94,7 @@ def _scene_as_given(
         instead = whole_run_tolerance(scene, work, work.beside_unseen - scene.error)
     else:
         trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.left())
-        error = error_of(trial, bench.reference, bench.measure)
+        error = max_error(trial, bench.reference, bench.measure)
         if isinstance(error, str) or error * bench.span.growth > work.beside_unseen:
             return None
         instead = SelectedSetting(

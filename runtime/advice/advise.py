@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from mstmm.errors import NumericalFailure
 
 from ..chart.chart_points import Point, Setting
-from ..chart.error_measure import measure_of, whole_length
-from ..chart.model_levels import Variant, ladder
+from ..chart.error_measure import scene_length_with_ends, select_measure
+from ..chart.model_levels import Variant, model_levels
 from ..chart.time_budget import Budget
 from ..integrate.steppers import AUTO
 from .advice import Advice
@@ -60,11 +60,11 @@ def make_advice(
     NumericalFailure where the scene cannot be run or no error of this size be judged.
     """
     work = AdviceState(model.scene, asked, budget or Budget(asked.budget), compile, tell)
-    top = ladder(work.scene)[-1]
+    top = model_levels(work.scene)[-1]
     richest = compile(top.scene)
     start = richest.simulate(0.0, method="dop853")
-    work.measure = Renaming(measure_of(richest, start, asked.of, True))
-    work.length = whole_length(richest)
+    work.measure = Renaming(select_measure(richest, start, asked.of, True))
+    work.length = scene_length_with_ends(richest)
     first = work.least(work.scene)
     work.size = size_of(work.measure, first)
     work.bench, base = _bench(work, top, richest, predict_errors(first, work.length)[0], state)

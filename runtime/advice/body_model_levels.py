@@ -11,7 +11,7 @@ from mstmm.scene.tables.beam import Beam
 from mstmm.scene.tables.beam_keys import DIRECTIONS, Modes
 from mstmm.scene.tables.elastic import Elastic
 
-from ..chart.model_levels import free_modes, modes_of, with_shapes, with_tables
+from ..chart.model_levels import beam_modes, vibration_mode_count, with_mode_counts, with_tables
 from ..packing.flexible.rigid_substitution import LEVELS
 
 RIGID, ONE_WAY, LINEAR, STIFFENED = "rigid", "one-way", "linear", "stiffened"
@@ -80,7 +80,7 @@ class Bodies:
 
     def __init__(self, richest: Scene) -> None:
         self.scene = richest
-        self._modes = modes_of(richest)
+        self._modes = beam_modes(richest)
         self.richest: dict[str, BodyModel] = {}
         found: tuple[Beam | Elastic, ...] = (*richest.beam, *richest.elastic)
         for body in found:
@@ -90,7 +90,7 @@ class Bodies:
 
     def _counts(self, body: Beam | Elastic) -> tuple[tuple[str, int], ...]:
         if isinstance(body, Elastic):
-            return ((VIBRATION, free_modes(body)),)
+            return ((VIBRATION, vibration_mode_count(body)),)
         modes = self._modes[body.name]
         return tuple((w, getattr(modes, w)) for w in DIRECTIONS if getattr(modes, w))
 
@@ -116,7 +116,7 @@ class Bodies:
         if isinstance(body, Elastic):
             return body.model_copy(update=update | {"modes": dict(choice.shapes)[VIBRATION]})
         kept = Modes(**dict(choice.shapes))
-        return with_shapes(body, self._modes[body.name], kept).model_copy(update=update)
+        return with_mode_counts(body, self._modes[body.name], kept).model_copy(update=update)
 
 
 def given_choice(body: Beam | Elastic, richest: BodyModel) -> BodyModel:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..chart.chart_points import Point, Setting
 from ..chart.time_budget import Budget
-from ..chart.trial_run import Runs, error_of
+from ..chart.trial_run import Runs, max_error
 from ..integrate.steppers import AUTO
 from .method_selection import SelectedSetting
 from .trial_models import TrialResult
@@ -45,7 +45,7 @@ def whole_run_tolerance(
         judge = runs.trial(best.running, beside, measure, budget.left() / 2)
         if trial.numbers is None or judge.numbers is None:
             return None
-        error = error_of(trial, judge, measure)
+        error = max_error(trial, judge, measure)
         if isinstance(error, str):
             return None
         if error <= left:

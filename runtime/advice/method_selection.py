@@ -10,7 +10,7 @@ from mstmm.errors import MstmmError, NumericalFailure
 
 from ..chart.chart_points import Point, Reference, Setting
 from ..chart.method_families import PROMISING
-from ..chart.method_survey import Curve, Survey, curve
+from ..chart.method_survey import Curve, Survey, method_curve
 from ..chart.pareto_front import bound_errors, recommend
 from ..chart.repeated_timing import repeat_timings
 from ..chart.time_budget import ALL, EARLY, Budget, OutOfTime
@@ -65,7 +65,7 @@ def cheapest(
         if found is not None:
             curves.append(Curve(found.method, one.name, model, enough, "", iter((found,))))
         curves += [
-            curve(method, one.name, model, bench.span.t_end, enough, own[one.name])
+            method_curve(method, one.name, model, bench.span.t_end, enough, own[one.name])
             for method in PROMISING
         ]
     found_all = survey.make(curves, EARLY)

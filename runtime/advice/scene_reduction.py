@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from mstmm.scene import split_reference
 
 from ..chart.model_levels import Variant
-from ..chart.planar_model import planar
+from ..chart.planar_model import planar_level
 from .advice_state import AdviceState
 from .hinge_reduction import Change, apply_changes
 from .measure_renaming import compose_names, rename_reference
@@ -33,7 +33,7 @@ _UNLIKELY = 5.0
 
 def in_plane(work: AdviceState, top: Variant, model: Model, richest: TrialResult) -> TrialResult:
     """The richest scene in its plane where that is the same motion."""
-    flat = planar(top, model, work.bench.reference.q) if work.bench.span.whole else None
+    flat = planar_level(top, model, work.bench.reference.q) if work.bench.span.whole else None
     if flat is None:
         return richest
     found = work.bench.tried("planar", flat.scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..chart.tables import Table, time_of
+from ..chart.tables import Table, format_time
 from .advice import Advice
 
 
@@ -13,7 +13,7 @@ def summary(advice: Advice) -> list[str]:
     met = "" if advice.error <= advice.asked else ", MORE than was asked"
     lines = [
         f"{asked}: {_model(advice)} by {advice.method}, {advice.setting}: error "
-        f"{advice.error:.1e}{met}, {time_of(advice.cpu_s)} CPU over {advice.compared}",
+        f"{advice.error:.1e}{met}, {format_time(advice.cpu_s)} CPU over {advice.compared}",
     ]
     savings = [
         _saved("the model", advice.model_saving if advice.reduced else None, "the given scene"),
@@ -63,7 +63,7 @@ def trial_table(advice: Advice) -> Table:
     """Every model that was run."""
     head = ("model", "error", "CPU time", "note")
     rows = [
-        (one.name, "" if one.error is None else f"{one.error:.1e}", time_of(one.cpu_s), one.why)
+        (one.name, "" if one.error is None else f"{one.error:.1e}", format_time(one.cpu_s), one.why)
         for one in advice.tried
     ]
     return head, (1, 2), rows

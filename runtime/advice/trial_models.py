@@ -15,7 +15,7 @@ from mstmm.scene import Scene
 
 from ..chart.chart_points import Setting
 from ..chart.time_budget import Budget, OutOfTime
-from ..chart.trial_run import Runs, Trial, error_of
+from ..chart.trial_run import Runs, Trial, max_error
 from ..integrate.steppers import AUTO
 from ..result.error_measure import Measure
 from .measure_renaming import Renaming
@@ -161,7 +161,7 @@ class TrialRunner:
             tight = max(self.rtol * _TIGHTER, _TIGHTEST)
             tighter = self._run(model, name, tight)
             self.measure.scale_by(_numbers(tighter))
-            apart = error_of(run, tighter, self.measure)
+            apart = max_error(run, tighter, self.measure)
             far = math.inf if isinstance(apart, str) else apart * self.span.growth
             if far <= _AGREE * asked:
                 break
@@ -189,7 +189,7 @@ class TrialRunner:
 
     def apart(self, a: Trial, b: Trial) -> float:
         """How far two runs are apart, over the whole run; inf where that is not known."""
-        found = error_of(a, b, self.measure)
+        found = max_error(a, b, self.measure)
         return math.inf if isinstance(found, str) else found * self.span.growth
 
     def refer_again(self, trial: Trial, names: Mapping[str, str]) -> None:
@@ -233,7 +233,7 @@ class TrialRunner:
         if trial.numbers is None:
             tried = TrialResult(name, scene, None, math.inf, trial.cpu_s, trial.failure)
         else:
-            found = error_of(trial, self.reference, self.measure)
+            found = max_error(trial, self.reference, self.measure)
             error, why = (math.inf, found) if isinstance(found, str) else (found, "")
             spent = self._least(model, trial)
             tried = TrialResult(name, scene, model, error * self.span.growth, spent, why)

@@ -1,1 +1,1 @@
-"""Cost against accuracy of one scene: every method, every level of model, and which to take."""
+"""Work-precision chart of a scene: all methods and model levels, and which setting to use."""

@@ -1,4 +1,4 @@
-"""From a model to its chart: reference, levels of model, settings, rounds."""
+"""Build the work-precision chart of a model: reference, model levels, settings, timing."""
 
 from __future__ import annotations
 
@@ -18,43 +18,43 @@ from ..integrate.steppers import AUTO
 from ..result.error_measure import Measure
 from .chart import Chart
 from .chart_points import Level, Reference, Setting, Skipped
-from .error_measure import measure_of
-from .error_times import even, refine_times
-from .method_families import PROMISING, checked_methods, without_twins
-from .method_survey import Curve, Survey, curve
-from .model_levels import Variant, ladder
+from .error_measure import select_measure
+from .error_times import equidistant_times, refine_times
+from .method_families import PROMISING, require_methods, without_index3_duplicates
+from .method_survey import Curve, Survey, method_curve
+from .model_levels import Variant, model_levels
 from .pareto_front import bound_errors, split_warnings
-from .planar_model import planar
-from .reference_solution import Converged, Tell, compute_reference
+from .planar_model import planar_level
+from .reference_solution import Converged, Report, compute_reference
 from .repeated_timing import repeat_timings
 from .time_budget import EARLY, REFERENCE, SETTINGS, Budget
-from .trial_run import Runs, Trial, error_of, warnings_of
+from .trial_run import Runs, Trial, max_error, scene_warnings
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: Relative tolerance of the runs, by the choice among methods, for the levels' own errors.
-_TIGHT = 1e-8
-#: Relative tolerance of the run whose steps tell how fast the motion is.
-_SCOUT = 1e-6
-#: Coordinates that change by less than this, in m and rad or of their own size, do not move.
-_STILL = 1e-12
-#: Levels with errors below this many times that tolerance are run as the reference was.
-_GOOD = 1e3
-#: Part of the budget by which the levels' own errors are to be found.
-_LEVELS = 0.45
-#: Why there is but one level.
+#: Relative tolerance of the runs with method "auto" that measure the errors of model levels.
+_LEVEL_RTOL = 1e-8
+#: Relative tolerance of the run whose steps show where the motion is fast.
+_STEP_SIZE_RTOL = 1e-6
+#: Coordinates that change by less than this (m, rad, or relative to their size) do not move.
+_MOTION_TOLERANCE = 1e-12
+#: Model levels with errors below this many times `_LEVEL_RTOL` use the setting of the reference.
+_ACCURATE_LEVEL_FACTOR = 1e3
+#: Fraction of the budget after which the errors of the model levels must be known.
+_LEVEL_BUDGET = 0.45
+#: Reason why there is only one model level.
 _NO_MODELS = (
-    "no models to compare: the scene has no flexible bodies, and no hinge that a motion in a plane "
-    "would make smaller"
+    "no model levels to compare: the scene has no flexible bodies, and no hinge that a planar "
+    "motion would simplify"
 )
-#: The name of the only level of a chart without levels of model.
+#: Name of the only level of a chart without model levels.
 AS_GIVEN = "as given"
 
 
 @dataclass(frozen=True)
 class ChartRequest:
-    """What was asked for, checked."""
+    """Validated arguments of `mstmm.chart`."""
 
     t_end: float
     quantities: tuple[str, ...]
@@ -67,17 +67,17 @@ class ChartRequest:
     rounds: int
 
 
-def request(
+def chart_request(
     t_end: float, quantities: Sequence[str], methods: Sequence[str] | None, models: bool,
     error: float, budget: float, samples: int | None, rounds: int,
 ) -> ChartRequest:  # fmt: skip
-    """SceneError naming the first argument that makes no sense."""
+    """Validate the arguments of `mstmm.chart`; SceneError names the first invalid one."""
     if isinstance(quantities, str) or isinstance(methods, str):
-        raise SceneError('quantities and methods: expected lists of names, as in ["tip.position"]')
+        raise SceneError('quantities, methods: expected lists of names, as in ["tip.position"]')
     return ChartRequest(
-        _above_zero("t_end", t_end, "a time in s"), tuple(quantities), checked_methods(methods),
-        bool(models), _above_zero("error", error, "an error"),
-        _above_zero("budget", budget, "a time in s"),
+        _require_positive("t_end", t_end, "a time in s"), tuple(quantities),
+        require_methods(methods), bool(models), _require_positive("error", error, "an error"),
+        _require_positive("budget", budget, "a time in s"),
         integer(
             "samples", CHART_SAMPLES if samples is None else samples, 2,
             "a whole number of samples, 2 or more",
@@ -87,171 +87,193 @@ def request(
     )  # fmt: skip
 
 
-def _above_zero(name: str, value: float, what: str) -> float:
-    found = finite_float(name, value, f"{what} above 0")
-    if not found > 0 or not math.isfinite(found):
-        raise SceneError(f"{name} = {found:g}: expected {what} above 0")
-    return found
+def _require_positive(name: str, value: float, meaning: str) -> float:
+    number = finite_float(name, value, f"{meaning} above 0")
+    if not number > 0 or not math.isfinite(number):
+        raise SceneError(f"{name} = {number:g}: expected {meaning} above 0")
+    return number
 
 
 def make_chart(
-    model: Model, asked: ChartRequest, compile: Callable[[Scene], Model], title: str, tell: Tell,
-    state: Callable[[str], None], budget: Budget | None = None,
+    model: Model, request: ChartRequest, compile: Callable[[Scene], Model], title: str,
+    report: Report, report_status: Callable[[str], None], budget: Budget | None = None,
 ) -> Chart:  # fmt: skip
-    """The chart of a model; `compile` makes models of its other levels.
+    """Build the work-precision chart of a model; `compile` makes the models of its other levels.
 
-    `state` hears the plan and what becomes of it, `tell` every step.  Raises SceneError for an
-    unknown quantity, NumericalFailure where there is no reference.
+    `report_status` is called with the time plan and the reference, `report` with a sentence before
+    every run.  Raises SceneError for an unknown quantity, NumericalFailure if no reference is
+    found.
     """
-    return _Charting(model, asked, compile, tell, state, budget or Budget(asked.budget)).chart(
-        title
-    )
+    return _ChartBuilder(
+        model, request, compile, report, report_status, budget or Budget(request.budget)
+    ).chart(title)
 
 
-class _Charting:
+class _ChartBuilder:
+    """Intermediate results of a chart: times, runs, model levels, skipped runs."""
+
     def __init__(
-        self, model: Model, asked: ChartRequest, compile: Callable[[Scene], Model], tell: Tell,
-        state: Callable[[str], None], budget: Budget,
+        self, model: Model, request: ChartRequest, compile: Callable[[Scene], Model],
+        report: Report, report_status: Callable[[str], None], budget: Budget,
     ) -> None:  # fmt: skip
         if model.closed is None:
-            asked = replace(asked, methods=without_twins(asked.methods))
-        self.model, self.asked, self.compile = model, asked, compile
-        self.tell, self.state, self.budget = tell, state, budget
-        self.times = even(asked.t_end, asked.samples)
-        self.runs = Runs(asked.t_end, self.times.at, budget)
+            request = replace(request, methods=without_index3_duplicates(request.methods))
+        self.model, self.request, self.compile = model, request, compile
+        self.report, self.report_status, self.budget = report, report_status, budget
+        self.times = equidistant_times(request.t_end, request.samples)
+        self.runs = Runs(request.t_end, self.times.at, budget)
         self.left_out: list[Skipped] = []
         self.levels: list[Level] = []
 
     def chart(self, title: str) -> Chart:
-        asked = self.asked
-        variants = ladder(self.model.scene) if asked.models else ()
-        top = self._top(variants)
-        start = top.simulate(0.0, method="dop853")
-        measure = measure_of(top, start, asked.quantities, asked.models)
-        self.state(self.budget.plan(len(asked.methods) * max(1, len(variants))))
+        request = self.request
+        variants = model_levels(self.model.scene) if request.models else ()
+        richest = self._richest_model(variants)
+        start = richest.simulate(0.0, method="dop853")
+        measure = select_measure(richest, start, request.quantities, request.models)
+        self.report_status(self.budget.plan(len(request.methods) * max(1, len(variants))))
         name = variants[-1].name if variants else AS_GIVEN
-        if not asked.fixed:
-            self._refine(top, name)
-        best = compute_reference(top, name, measure, self.runs, self.tell)
+        if not request.fixed:
+            self._refine_times(richest, name)
+        best = compute_reference(richest, name, measure, self.runs, self.report)
         reference = Reference(
             best.error, best.made_by, name, measure.name, measure.unit, measure.scaling,
-            best.run.ended, _still(best.run.q),
+            best.run.ended, _is_static(best.run.q),
         )  # fmt: skip
-        self._say(reference)
-        curves = self._curves(variants, top, best, measure, reference)
+        self._report_reference(reference)
+        curves = self._curves(variants, richest, best, measure, reference)
         if reference.still:
             curves = []
-        survey = Survey(best.run, measure, self.runs, self.tell)
-        survey.make([one for one in curves if one.method in PROMISING], EARLY)
-        found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
-        points, missed = repeat_timings(
-            found.points, found.models, asked.rounds, self.runs, self.tell
+        survey = Survey(best.run, measure, self.runs, self.report)
+        survey.make([curve for curve in curves if curve.method in PROMISING], EARLY)
+        surveyed = survey.make(
+            [curve for curve in curves if curve.method not in PROMISING], SETTINGS
         )
-        if missed and asked.rounds:
-            why = f"{missed} of {len(points)} runs were timed less often than the others, for time"
-            self.left_out.append(Skipped("", "", "", why, False))
-        own = {
+        points, missed = repeat_timings(
+            surveyed.points, surveyed.models, request.rounds, self.runs, self.report
+        )
+        if missed and request.rounds:
+            reason = (
+                f"{missed} of {len(points)} runs were timed less often than the others, for lack "
+                "of time"
+            )
+            self.left_out.append(Skipped("", "", "", reason, False))
+        level_errors = {
             level.name: level.error
             for level in self.levels
             if level.error is not None and level.name != reference.model
         }
-        settled, warned = split_warnings(bound_errors(points, reference, own))
+        points_with_bounds, common_warnings = split_warnings(
+            bound_errors(points, reference, level_errors)
+        )
         return Chart(
-            title, asked.t_end, len(self.times.at), reference, settled,
-            tuple(self.levels), (*self.left_out, *found.left_out), asked.error, asked.budget,
+            title, request.t_end, len(self.times.at), reference, points_with_bounds,
+            tuple(self.levels), (*self.left_out, *surveyed.left_out), request.error, request.budget,
             self.budget.spent, self.times.words,
-            (*warnings_of(top.scene), *warned),
+            (*scene_warnings(richest.scene), *common_warnings),
         )  # fmt: skip
 
-    def _refine(self, top: Model, name: str) -> None:
-        """More times where the motion is faster than even ones; none where that takes too long."""
-        self.tell("times at which errors are looked at")
-        setting = Setting(AUTO, name, _SCOUT)
-        steps = self.runs.steps(top, setting, self.budget.share(REFERENCE))
+    def _refine_times(self, richest: Model, name: str) -> None:
+        """Add times where the motion is fast, unless the run for that takes too long."""
+        self.report("run to choose the times of the error")
+        setting = Setting(AUTO, name, _STEP_SIZE_RTOL)
+        steps = self.runs.steps(richest, setting, self.budget.share(REFERENCE))
         if not len(steps):
             return
-        self.times = refine_times(even(steps[-1], self.asked.samples), steps)
+        self.times = refine_times(equidistant_times(steps[-1], self.request.samples), steps)
         self.runs.times = self.times.at
 
-    def _say(self, reference: Reference) -> None:
-        """What is known once there is a reference."""
-        self.state(f"reference by {reference.made_by}: its own error is {reference.error:.1e}")
-        self.state(f"errors are looked at {self.times.words}")
+    def _report_reference(self, reference: Reference) -> None:
+        """Report the reference, and the times at which errors are evaluated."""
+        self.report_status(
+            f"reference: {reference.made_by}; its own error is {reference.error:.1e}"
+        )
+        self.report_status(f"errors are evaluated at {self.times.words}")
         if reference.ended:
-            self.state(f"the runs do not reach {self.asked.t_end:g} s: {reference.ended}")
+            self.report_status(f"runs end before {self.request.t_end:g} s: {reference.ended}")
         if reference.still:
-            self.state("nothing moves in this scene: there is nothing to compare")
+            self.report_status("nothing moves in this scene: no methods are compared")
 
-    def _top(self, variants: Sequence[Variant]) -> Model:
-        """The model of the richest level; with others beside it compiled as they are."""
+    def _richest_model(self, variants: Sequence[Variant]) -> Model:
+        """Model of the richest level; compiled like the other levels if there are any."""
         return self.compile(variants[-1].scene) if variants else self.model
 
     def _curves(
-        self, variants: Sequence[Variant], top: Model, best: Converged, measure: Measure,
+        self, variants: Sequence[Variant], richest: Model, best: Converged, measure: Measure,
         reference: Reference,
     ) -> list[Curve]:  # fmt: skip
-        """All methods on all levels, the richest one last."""
+        """Curves of all methods on all model levels, the richest level last."""
         models: list[tuple[str, Model, float | None]] = []
         others = list(variants[:-1])
-        if variants and (flat := planar(variants[-1], top, best.run.q)) is not None:
-            others.append(flat)
+        if variants and (planar := planar_level(variants[-1], richest, best.run.q)) is not None:
+            others.append(planar)
         for variant in others:
-            found = self._level(variant, best, measure)
-            if found is not None:
-                models.append((variant.name, *found))
-        if self.asked.models and not others:
+            evaluated = self._evaluate_level(variant, best, measure)
+            if evaluated is not None:
+                models.append((variant.name, *evaluated))
+        if self.request.models and not others:
             self.left_out.append(Skipped("", "", "", _NO_MODELS, True))
-        models.append((reference.model, top, None))
-        self.levels.append(Level(reference.model, reference.error, _freedom(top), top.engine))
+        models.append((reference.model, richest, None))
+        self.levels.append(
+            Level(reference.model, reference.error, _degrees_of_freedom(richest), richest.engine)
+        )
         return [
-            curve(method, level, model, self.asked.t_end, reference.floor, own)
-            for method in self.asked.methods
-            for level, model, own in models
+            method_curve(method, level, model, self.request.t_end, reference.floor, level_error)
+            for method in self.request.methods
+            for level, model, level_error in models
         ]
 
-    def _level(
+    def _evaluate_level(
         self, variant: Variant, best: Converged, measure: Measure
     ) -> tuple[Model, float | None] | None:
-        """The model of a level and its own error; None, with the reason kept, where it does not
-        apply."""
-        self.tell(f"level {variant.name}")
+        """Model of a level and its error (None if unknown); None if the level does not apply.
+
+        The reason is added to the skipped runs.
+        """
+        self.report(f"model level {variant.name}")
         try:
             model = self.compile(variant.scene)
-            run = self._converged(model, variant.name, best, measure)
+            run = self._run_accurately(model, variant.name, best, measure)
         except MstmmError as problem:
             self.left_out.append(Skipped("", variant.name, "", str(problem), True))
             return None
         if run.numbers is None and not run.late:
             self.left_out.append(Skipped("", variant.name, "", run.failure, True))
             return None
-        own = "it took too long" if run.late else error_of(run, best.run, measure)
-        if isinstance(own, str):
-            why = f"no error of its own was found: {own}"
-            self.left_out.append(Skipped("", variant.name, "", why, False))
-        known = None if isinstance(own, str) else own
-        self.levels.append(Level(variant.name, known, _freedom(model), model.engine))
-        return model, known
+        error = "the run took too long" if run.late else max_error(run, best.run, measure)
+        if isinstance(error, str):
+            reason = f"error of the model level unknown: {error}"
+            self.left_out.append(Skipped("", variant.name, "", reason, False))
+        level_error = None if isinstance(error, str) else error
+        self.levels.append(
+            Level(variant.name, level_error, _degrees_of_freedom(model), model.engine)
+        )
+        return model, level_error
 
-    def _converged(self, model: Model, level: str, best: Converged, measure: Measure) -> Trial:
-        """A run of a level whose own error is small beside that of the level; made as the reference
-        was where the level is so good that this takes it."""
-        limit = self.budget.share(_LEVELS)
-        run = self.runs.trial(model, Setting(AUTO, level, _TIGHT), measure, limit)
+    def _run_accurately(self, model: Model, level: str, best: Converged, measure: Measure) -> Trial:
+        """Run of a level whose integration error is small compared with the error of the level.
+
+        An accurate level needs the setting of the reference for that.
+        """
+        limit = self.budget.share(_LEVEL_BUDGET)
+        run = self.runs.trial(model, Setting(AUTO, level, _LEVEL_RTOL), measure, limit)
         if run.numbers is None:
             return run
-        error = error_of(run, best.run, measure)
-        if isinstance(error, str) or error > _GOOD * _TIGHT:
+        error = max_error(run, best.run, measure)
+        if isinstance(error, str) or error > _ACCURATE_LEVEL_FACTOR * _LEVEL_RTOL:
             return run
         tight = replace(best.run.setting, model=level)
         tighter = self.runs.trial(model, tight, measure, limit)
         return run if tighter.numbers is None else tighter
 
 
-def _freedom(model: Model) -> int:
-    """Its speeds, of a mechanism those that its loops leave."""
+def _degrees_of_freedom(model: Model) -> int:
+    """Number of degrees of freedom; of a mechanism, its mobility."""
     return model.nu if model.closed is None else model.closed.loops.mobility
 
 
-def _still(q: Array) -> bool:
-    """Whether no coordinate (n, nq) moves."""
-    return bool((q.max(axis=0) - q.min(axis=0) <= _STILL * np.maximum(1.0, abs(q[0]))).all())
+def _is_static(q: Array) -> bool:
+    """Whether no coordinate moves; q is (n, nq)."""
+    return bool(
+        (q.max(axis=0) - q.min(axis=0) <= _MOTION_TOLERANCE * np.maximum(1.0, abs(q[0]))).all()
+    )

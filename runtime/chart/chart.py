@@ -1,4 +1,4 @@
-"""A chart and the ways out of it: a picture, a page, a file of numbers."""
+"""Work-precision chart of a scene with its plot, HTML page and JSON file."""
 
 from __future__ import annotations
 
@@ -16,35 +16,40 @@ from .matplotlib_plot import has_matplotlib, plot
 
 @dataclass(frozen=True)
 class Chart(ChartRecord):
-    """Cost against accuracy of one scene.  Made by `mstmm.chart`.
+    """Work-precision chart: CPU time against error of all methods.  Made by `mstmm.chart`.
 
-    `ChartRecord` says what its attributes are.
+    The attributes are those of `ChartRecord`.
     """
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure` (extra: plot); with `path` also written: .png, .svg, .pdf."""
+        """Plot as `matplotlib.figure.Figure`; needs the extra `plot`.
+
+        With `path` (.png, .svg, .pdf) also write the file.
+        """
         return plot(self, None if path is None else Path(path))
 
     def to_html(self) -> str:
-        """A page that needs nothing else: the picture, its points shown by the pointer, and all
-        that is known in tables."""
+        """Self-contained HTML page: the plot, with details of a point on hover, and all tables."""
         return page(self)
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write chart.html, chart.json and, where matplotlib is installed, chart.png.
 
-        EnvironmentFailure where the folder cannot be made or written to.
+        Returns the paths of the files.  Raises EnvironmentFailure if the folder cannot be created
+        or written to.
         """
-        place = Path(folder)
+        directory = Path(folder)
         try:
-            place.mkdir(parents=True, exist_ok=True)
+            directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise EnvironmentFailure(f'folder "{place}" cannot be made: {error.strerror}') from None
-        made = []
+            raise EnvironmentFailure(
+                f'folder "{directory}": cannot be created: {error.strerror}'
+            ) from None
+        paths = []
         for name, text in (("chart.html", self.to_html()), ("chart.json", self.to_json())):
-            write_text(place / name, text)
-            made.append(place / name)
+            write_text(directory / name, text)
+            paths.append(directory / name)
         if has_matplotlib():
-            self.plot(place / "chart.png")
-            made.append(place / "chart.png")
-        return tuple(made)
+            self.plot(directory / "chart.png")
+            paths.append(directory / "chart.png")
+        return tuple(paths)

@@ -1,18 +1,20 @@
-"""What a chart is made of: settings, runs with what they cost and how far they err, and what was
-not run."""
+"""Data classes of a chart: settings, measured points, skipped runs, model levels, reference."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-#: Absolute tolerance as part of the relative one.
-ATOL_PART = 0.01
+#: Absolute tolerance as a fraction of the relative one.
+ATOL_FRACTION = 0.01
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How a run is made: `value` is the fixed step in s, or the relative tolerance."""
+    """Method, model level and accuracy setting of a run.
+
+    `value` is the fixed step in s if `fixed`, else the relative tolerance.
+    """
 
     method: str
     model: str
@@ -21,14 +23,14 @@ class Setting:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Arguments of `simulate`."""
+        """Keyword arguments of `simulate`."""
         if self.fixed:
             return {"method": self.method, "step": self.value}
-        return {"method": self.method, "rtol": self.value, "atol": ATOL_PART * self.value}
+        return {"method": self.method, "rtol": self.value, "atol": ATOL_FRACTION * self.value}
 
     @property
     def numbers(self) -> dict[str, float]:
-        """{"step": s}, or {"rtol": ..., "atol": ...}."""
+        """Numerical options: {"step": s}, or {"rtol": ..., "atol": ...}."""
         return {name: value for name, value in self.options.items() if name != "method"}
 
     def __str__(self) -> str:
@@ -37,20 +39,20 @@ class Setting:
 
 @dataclass(frozen=True)
 class Point:
-    """One run.
+    """Point of a chart: error and CPU time of one setting.
 
     Attributes:
-        setting: how it was made.
+        setting: method, model level and tolerance or step.
         error: largest deviation from the reference over the samples; None for a run that failed.
-        cpu_s: processor time of the whole call of `simulate`, the least of `repeats`; s.
-        evaluations, factorizations, steps: counts of the run, None where the method keeps none.
-        failure: why the run gave no error, "" if it did.
-        limited: the error is so small that it may be the reference's own.
-        sure_error: the largest error of this setting and all tighter ones of its curve, so that a
-            lucky hit is not taken for accuracy.
-        warnings: what the run itself warns of.
-        too_coarse: among that, that its fixed step is longer than the fastest motion needs: such a
-            run is not to be trusted however near it came, and never recommended.
+        cpu_s: CPU time of the whole call of `simulate`, the smallest of `repeats` calls; s.
+        evaluations, factorizations, steps: counts of the run, None if the method does not count.
+        failure: reason why the run gave no error, "" if it did.
+        limited: the error is small enough to be the error of the reference.
+        sure_error: error bound: largest error of this setting and all tighter ones of its curve, so
+            that an accidentally small error does not count.
+        warnings: warnings of this run.
+        too_coarse: the fixed step is too long for the fastest motion; such a run is not trusted and
+            never recommended, however small its error.
     """
 
     setting: Setting
@@ -73,16 +75,16 @@ class Point:
 
     @property
     def model(self) -> str:
-        """Name of the level of model."""
+        """Name of the model level."""
         return self.setting.model
 
     @property
     def curve(self) -> tuple[str, str]:
-        """(model, method): the points that differ in tolerance or step alone."""
+        """(model level, method): key of the points that differ only in tolerance or step."""
         return self.setting.model, self.setting.method
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values, as in chart.json."""
         return {
             "method": self.method, "model": self.model, "setting": self.setting.numbers,
             "error": self.error, "sure_error": self.sure_error, "cpu_s": self.cpu_s,
@@ -95,9 +97,10 @@ class Point:
 
 @dataclass(frozen=True)
 class Skipped:
-    """What was not run, and why: a method, a level of model, or the tighter settings of a curve.
+    """Method, model level or tighter settings of a curve that were not run, with the reason.
 
-    `refused` tells what the scene or the machine does not allow from what time did not allow.
+    `refused`: the scene or the machine does not support it; otherwise time was short, or it would
+    have shown nothing new.
     """
 
     method: str
@@ -107,21 +110,20 @@ class Skipped:
     refused: bool
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values, as in chart.json."""
         return {
             "method": self.method or None, "model": self.model or None,
             "setting": self.setting or None, "reason": self.reason, "refused": self.refused,
         }  # fmt: skip
 
     def __str__(self) -> str:
-        named = ", ".join(word for word in (self.model, self.method, self.setting) if word)
-        return f"{named}: {self.reason}"
+        name = ", ".join(part for part in (self.model, self.method, self.setting) if part)
+        return f"{name}: {self.reason}"
 
 
 @dataclass(frozen=True)
 class Level:
-    """A level of model: its name, its own error (None where it was not found), degrees of freedom,
-    and the engine that ran it."""
+    """Model level: name, error (None if unknown), degrees of freedom, and engine."""
 
     name: str
     error: float | None
@@ -129,7 +131,7 @@ class Level:
     engine: str
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values, as in chart.json."""
         return {
             "name": self.name, "error": self.error,
             "degrees_of_freedom": self.degrees_of_freedom, "engine": self.engine,
@@ -138,15 +140,15 @@ class Level:
 
 @dataclass(frozen=True)
 class Reference:
-    """What errors are measured against.
+    """Reference solution that errors are relative to.
 
     Attributes:
-        error: of the reference itself, in the measure of all others.
-        made_by: the runs that were compared, in words.
-        model: its level of model.
-        measure, unit, scaling: what is compared, in which unit, and what it is divided by.
-        ended: which event ended its run, and when; "" where none did.
-        still: nothing moves in it.
+        error: error of the reference itself, in the same measure as all others.
+        made_by: description of the runs that were compared.
+        model: name of its model level.
+        measure, unit, scaling: compared quantity, its unit, and what it is divided by.
+        ended: event that ended its run, and when; "" if none did.
+        still: no coordinate moves.
     """
 
     error: float
@@ -160,11 +162,11 @@ class Reference:
 
     @property
     def floor(self) -> float:
-        """Errors below this may be the reference's own."""
+        """Smallest resolved error: errors below it may be those of the reference."""
         return 3.0 * self.error
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """Plain values, as in chart.json."""
         return {
             "error": self.error, "made_by": self.made_by, "model": self.model,
             "measure": self.measure, "unit": self.unit, "scaling": self.scaling,

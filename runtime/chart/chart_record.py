@@ -1,4 +1,4 @@
-"""What a chart knows: points, the reference they were measured against, the front, what to take."""
+"""Data of a work-precision chart: points, reference, Pareto front and recommendations."""
 
 from __future__ import annotations
 
@@ -9,28 +9,29 @@ from typing import Any
 
 from mstmm.errors import MstmmError
 
-from . import pareto_front as fronts
 from .chart_points import Level, Point, Reference, Skipped
+from .pareto_front import pareto_front, recommend
 
-#: Errors for which the cheapest setting is told.
-ASKED = tuple(10.0**-k for k in range(1, 11))
+#: Target errors for which the cheapest setting is listed.
+TARGET_ERRORS = tuple(10.0**-k for k in range(1, 11))
 
 
 @dataclass(frozen=True)
 class ChartRecord:
-    """Cost against accuracy of one scene; `Chart` adds the ways out of it.
+    """Work-precision chart of a scene; `Chart` adds plots and files.
 
     Attributes:
-        title: what was charted.
-        t_end: end of the runs, s; `samples` is at how many times errors were looked at.
-        reference: what errors are measured against, and its own error.
+        title: title of the plot.
+        t_end: end of the runs, s.
+        samples: number of times at which the error is evaluated.
+        reference: reference solution that errors are relative to, and its own error.
         points: every run; see `Point`.
-        levels: of model, from the smallest to the richest, with their own errors.
-        left_out: methods and levels that were refused, settings that were not run, and why.
-        wanted: the error for which a setting was asked.
-        budget, spent: s of the clock.
-        looked: how the times lie at which errors were looked at, in words.
-        warnings: what the scene, and every run of it, warns of, whatever the method.
+        levels: model levels from the smallest to the richest, with their own errors.
+        left_out: methods and levels that were rejected, settings that were not run, and why.
+        wanted: target error of the recommended setting.
+        budget, spent: wall-clock time allowed and used, s.
+        looked: description of the times at which the error is evaluated.
+        warnings: warnings of the scene, and those that every run of it gives.
     """
 
     title: str
@@ -48,36 +49,35 @@ class ChartRecord:
 
     @cached_property
     def front(self) -> tuple[Point, ...]:
-        """Pareto's front of sure error and processor time, cheapest first."""
-        return fronts.front(self.points, self.reference.floor)
+        """Pareto front of error bound (`sure_error`) and CPU time, cheapest first."""
+        return pareto_front(self.points, self.reference.floor)
 
     def recommended(self, error: float | None = None) -> Point:
-        """The cheapest point that errs by at most `error` (the wanted one unless given), as do all
-        tighter settings of its method.
+        """Cheapest point whose error bound does not exceed `error` (default: `wanted`).
 
-        SceneError for an error that is not above 0, NumericalFailure, with what there is, where no
-        point meets it or the reference cannot tell.
+        Raises SceneError for an error that is not above 0, and NumericalFailure, with the smallest
+        error that was reached, if no point meets it or the reference is not accurate enough.
         """
-        asked = self.wanted if error is None else error
-        return fronts.recommend(self.points, asked, self.reference)
+        target_error = self.wanted if error is None else error
+        return recommend(self.points, target_error, self.reference)
 
     def advice(self) -> list[tuple[float, Point]]:
-        """(error, recommended point) for every power of ten that a point meets."""
-        found = []
-        for error in ASKED:
+        """(target error, recommended point) for every power of ten that is reached."""
+        recommendations = []
+        for error in TARGET_ERRORS:
             try:
-                found.append((error, self.recommended(error)))
+                recommendations.append((error, self.recommended(error)))
             except MstmmError:
                 break
-        return found
+        return recommendations
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain values."""
+        """All data as plain values, as in chart.json."""
         best, why = None, None
         try:
             best = self.recommended().to_dict()
-        except MstmmError as error:
-            why = str(error)
+        except MstmmError as problem:
+            why = str(problem)
         return {
             "scene": self.title, "t_end": self.t_end, "samples": self.samples, "times": self.looked,
             "reference": self.reference.to_dict(),
@@ -86,10 +86,10 @@ class ChartRecord:
             "recommended": best, "recommended_for": self.wanted, "not_recommended": why,
             "advice": [{"asked": e, **point.to_dict()} for e, point in self.advice()],
             "models": [level.to_dict() for level in self.levels],
-            "left_out": [one.to_dict() for one in self.left_out],
+            "left_out": [skipped.to_dict() for skipped in self.left_out],
             "warnings": list(self.warnings), "budget_s": self.budget, "spent_s": self.spent,
         }  # fmt: skip
 
     def to_json(self) -> str:
-        """The same as JSON text."""
+        """All data as JSON text."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n"

@@ -1,6 +1,4 @@
-"""What the errors of a chart are errors of: measures of any result, or the places of bodies, which
-every level of model has.
-"""
+"""Error measures of a chart: quantities, coordinates, or positions of all bodies and ends."""
 
 from __future__ import annotations
 
@@ -21,38 +19,42 @@ if TYPE_CHECKING:
 
 
 class Places(Measure):
-    """The places of all bodies and ends, which every level of model has.
+    """Positions of all bodies and ends, relative to the scene length; for any level.
 
-    Of a flexible body its ends alone: its floating frame lies elsewhere on every level.
+    Flexible bodies are compared at their ends only: the position of the floating frame depends on
+    the model level.
     """
 
-    name = "places of all bodies and ends"
+    name = "positions of all bodies and ends"
 
     def __init__(self, model: CompiledScene, start: Result) -> None:
-        self._length, scene = whole_length(model), model.scene
-        ending, floating = ".position", {one.name for one in (*scene.beam, *scene.elastic)}
-        names = [name[: -len(ending)] for name in start.names() if name.endswith(ending)]
+        self._length, scene = scene_length_with_ends(model), model.scene
+        suffix, floating = ".position", {body.name for body in (*scene.beam, *scene.elastic)}
+        names = [name.removesuffix(suffix) for name in start.names() if name.endswith(suffix)]
         self._names = [name for name in names if name not in floating]
-        self.scaling = f"parts of the length of the scene, {self._length:g} m"
+        self.scaling = f"relative to the length of the scene, {self._length:g} m"
 
     def read(self, result: Record) -> Array:
         return np.hstack([result.position(name) for name in self._names])
 
     def apart(self, a: Array, b: Array) -> Array:
-        ways = (a - b).reshape(len(a), -1, 3)
-        return np.asarray(np.linalg.norm(ways, axis=2).max(axis=1) / self._length)
+        displacements = (a - b).reshape(len(a), -1, 3)
+        return np.asarray(np.linalg.norm(displacements, axis=2).max(axis=1) / self._length)
 
 
-def whole_length(model: CompiledScene) -> float:
-    """The length of a scene, m, by its rigid and its flexible bodies."""
+def scene_length_with_ends(model: CompiledScene) -> float:
+    """Length of a scene, m, including the ends of its flexible bodies."""
     ports = [port for body in model.flexible.values() for port in body.ports.values()]
     return max([scene_length(model), *(float(np.linalg.norm(port.position)) for port in ports)])
 
 
-def measure_of(model: CompiledScene, start: Result, names: Sequence[str], models: bool) -> Measure:
-    """What is compared; `start` is a result of the model with one sample.
+def select_measure(
+    model: CompiledScene, start: Result, names: Sequence[str], models: bool
+) -> Measure:
+    """Error measure of these quantities; without names, of all coordinates or positions.
 
-    Raises SceneError, with the nearest name, for a quantity that the model does not have.
+    `start` is a result of the model with one sample; `models` selects positions, which every model
+    level has.  Raises SceneError, with the nearest name, for a quantity that the model lacks.
     """
     if names:
         return Quantities(start, names)

@@ -1,7 +1,7 @@
-"""When errors are looked at: even times, and more of them where the motion is faster than these.
+"""Times at which errors are evaluated: equidistant, with more where the motion is fast.
 
-How fast it is the steps of a run tell that chooses them by itself: where it takes several between
-two even times, something happens there that those do not see.
+The steps of a run with step size control show where that is: several steps between two equidistant
+times mean motion that these times would miss.
 """
 
 from __future__ import annotations
@@ -12,45 +12,46 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-#: How many times there are at most, in even ones.
-_MOST = 4
+#: Largest number of times, relative to the equidistant ones.
+_MAX_COUNT_FACTOR = 4
 
-#: Steps between two even times that tell of a fast motion; runs begin with two or three short ones.
-_SEVERAL = 4
+#: Steps between two equidistant times that indicate fast motion; every run begins with two or three
+#: short steps, which do not.
+_FAST_STEP_COUNT = 4
 
-#: Times nearer to each other than this part of the run are one.
-_SAME = 1e-12
+#: Times closer together than this fraction of the run are merged.
+_MERGE_FRACTION = 1e-12
 
 
 @dataclass(frozen=True)
 class Times:
-    """Samples (n,) in s, and how they lie in words."""
+    """Times of samples (n,), s, and a description of their distribution."""
 
     at: Array
     words: str
 
 
-def even(t_end: float, count: int) -> Times:
-    """So many times from 0 to t_end."""
-    return Times(np.linspace(0.0, t_end, count), f"{count} even times up to {t_end:.6g} s")
+def equidistant_times(t_end: float, count: int) -> Times:
+    """Equidistant times from 0 to t_end, s."""
+    return Times(np.linspace(0.0, t_end, count), f"{count} equidistant times up to {t_end:.6g} s")
 
 
 def refine_times(times: Times, steps: Array) -> Times:
-    """Even times with the ends of steps (m,), in s, where there are several between two of them.
+    """Add the ends of steps (m,), s, to the intervals that contain several of them.
 
-    Of more than there is room for, one in so many.
+    Additional times beyond the largest number allowed are thinned out evenly.
     """
     first, last = times.at[0], times.at[-1]
-    same = _SAME * (last - first)
+    min_distance = _MERGE_FRACTION * (last - first)
     inside = steps[(steps > first) & (steps < last)]
-    place = np.searchsorted(times.at, inside) - 1
-    crowded = np.bincount(place, minlength=len(times.at)) >= _SEVERAL
-    apart = np.minimum(inside - times.at[place], times.at[place + 1] - inside) > same
-    more = np.unique(inside[crowded[place] & apart])
-    room = (_MOST - 1) * len(times.at)
-    if len(more) > room:
-        more = more[np.linspace(0, len(more) - 1, room).round().astype(int)]
-    if not len(more):
+    interval = np.searchsorted(times.at, inside) - 1
+    is_fast = np.bincount(interval, minlength=len(times.at)) >= _FAST_STEP_COUNT
+    distances = np.minimum(inside - times.at[interval], times.at[interval + 1] - inside)
+    added = np.unique(inside[is_fast[interval] & (distances > min_distance)])
+    max_count = (_MAX_COUNT_FACTOR - 1) * len(times.at)
+    if len(added) > max_count:
+        added = added[np.linspace(0, len(added) - 1, max_count).round().astype(int)]
+    if not len(added):
         return times
-    words = f"{times.words}, and {len(more)} more where the motion is fast"
-    return Times(np.union1d(times.at, more), words)
+    words = f"{times.words}, and {len(added)} more where the motion is fast"
+    return Times(np.union1d(times.at, added), words)

@@ -1,4 +1,4 @@
-"""The page of a chart: one file that needs no network and no script."""
+"""HTML page of a chart: one file, without scripts or network access."""
 
 from __future__ import annotations
 
@@ -9,9 +9,16 @@ from mstmm.safe_text import escape_control_characters
 
 from .chart_points import Skipped
 from .chart_record import ChartRecord
-from .plot_elements import Entry, drawing
-from .svg import mark, svg
-from .tables import Table, advice, levels, points, recommendation, skip_reasons
+from .plot_elements import Entry, build_drawing
+from .svg import chart_svg, marker_svg
+from .tables import (
+    Table,
+    level_table,
+    point_table,
+    recommendation,
+    recommendation_table,
+    skip_reasons,
+)
 
 _STYLE = """
 :root { color-scheme: light; --ink: #1b1f24; --soft: #57606a; --line: #d5dae0; }
@@ -52,9 +59,9 @@ ul.left { font-size: .88rem; padding-left: 1.1rem; } summary { cursor: pointer; 
 
 
 def page(chart: ChartRecord) -> str:
-    """The whole page."""
-    made = drawing(chart)
-    keys = {name: i for i, name in enumerate(dict.fromkeys(line.name for line in made.lines))}
+    """HTML page of a chart."""
+    drawing = build_drawing(chart)
+    keys = {name: i for i, name in enumerate(dict.fromkeys(line.name for line in drawing.lines))}
     hover = "".join(
         f".chart:has(.e{i}:hover) .plane g[class*=k]:not(.k{i}){{opacity:.08}}"
         f".chart:has(.e{i}:hover) .plane .k{i}{{opacity:1}}"
@@ -62,59 +69,60 @@ def page(chart: ChartRecord) -> str:
     )
     reference = chart.reference
     body = [
-        f"<h1>{escape(escape_control_characters(made.title))}: cost against accuracy</h1>",
-        f'<p class="soft">{escape(_how(chart))}</p>',
+        f"<h1>{escape(escape_control_characters(drawing.title))}: work-precision chart</h1>",
+        f'<p class="soft">{escape(_conditions(chart))}</p>',
         f'<p class="soft">Reference: {escape(reference.made_by)}. Its own error is '
-        f"{reference.error:.1e}; errors below {reference.floor:.1e} may be its own. Scaling: "
+        f"{reference.error:.1e}; errors below {reference.floor:.1e} are not resolved. Scaling: "
         f"{escape(escape_control_characters(reference.scaling))}.</p>",
-        *(f"<p>{escape(escape_control_characters(text))}</p>" for text in _of_scene(chart)),
-        '<div class="chart"><div class="plane">', svg(made, keys), "</div>",
-        _legend(made.legend, keys), "</div>",
+        *(f"<p>{escape(escape_control_characters(text))}</p>" for text in _scene_notes(chart)),
+        '<div class="chart"><div class="plane">', chart_svg(drawing, keys), "</div>",
+        _legend(drawing.legend, keys), "</div>",
     ]  # fmt: skip
-    if made.beyond:
+    if drawing.beyond:
         body.append(
-            f'<p class="soft">{made.beyond} of the points err by far more and lie beyond the '
-            "picture.</p>"
+            f'<p class="soft">{drawing.beyond} points with far larger errors are outside the plot.'
+            "</p>"
         )
-    said = recommendation(chart)
-    said = said[:1].upper() + said[1:]
-    body += ["<h2>What to take</h2>", f"<p>{escape(escape_control_characters(said))}</p>"]
+    text = recommendation(chart)
+    text = text[:1].upper() + text[1:]
+    body += ["<h2>Recommended settings</h2>", f"<p>{escape(escape_control_characters(text))}</p>"]
     if chart.advice():
-        body.append(_html(advice(chart)))
+        body.append(_table_html(recommendation_table(chart)))
     if len(chart.levels) > 1:
-        body += ["<h2>Levels of model</h2>", _html(levels(chart))]
+        body += ["<h2>Model levels</h2>", _table_html(level_table(chart))]
     body += [
         "<h2>All runs</h2>", f"<details><summary>{len(chart.points)} settings</summary>",
-        _html(points(chart)), "</details>", _left_out(chart.left_out),
+        _table_html(point_table(chart)), "</details>", _skipped_html(chart.left_out),
     ]  # fmt: skip
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8"/>\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1"/>\n'
-        f"<title>{escape(escape_control_characters(made.title))}: cost against accuracy</title>\n"
+        f"<title>{escape(escape_control_characters(drawing.title))}: work-precision chart</title>\n"
         f"<style>{_STYLE}{hover}</style>\n</head>\n<body>\n<main>\n"
         + "\n".join(part for part in body if part)
         + "\n</main>\n</body>\n</html>\n"
     )
 
 
-def _how(chart: ChartRecord) -> str:
+def _conditions(chart: ChartRecord) -> str:
+    """Simulated time, error measure, timing and budget of the chart."""
     unit = "" if chart.reference.unit == "1" else f" in {chart.reference.unit}"
     return (
-        f"{chart.t_end:g} s of motion. Errors: the largest of "
+        f"{chart.t_end:g} s of motion. Error: largest error of "
         f"{escape_control_characters(chart.reference.measure)}"
-        f"{unit} over {chart.looked}. Times: processor time of the whole call of simulate, the "
-        f"least of several. Made in {chart.spent:.0f} s of a budget of {chart.budget:g} s. "
-        "Rest the pointer on a point, or on a name of the legend."
+        f"{unit} over {chart.looked}. Time: CPU time of the whole call of simulate, the "
+        f"smallest of several. Computed in {chart.spent:.0f} s of a budget of {chart.budget:g} s. "
+        "Hover over a point or a name of the legend for details."
     )
 
 
-def _of_scene(chart: ChartRecord) -> list[str]:
-    """What holds for all runs: that they end early, that nothing moves, what the scene warns of."""
+def _scene_notes(chart: ChartRecord) -> list[str]:
+    """Notes that hold for all runs: early end, no motion, warnings of the scene."""
     ended = chart.reference.ended
-    found = [f"The runs do not reach {chart.t_end:g} s: {ended}."] if ended else []
+    notes = [f"Runs end before {chart.t_end:g} s: {ended}."] if ended else []
     if chart.reference.still:
-        found.append("Nothing moves in this scene: there is nothing to compare.")
-    return [*found, *(f"The scene warns: {text}" for text in chart.warnings)]
+        notes.append("Nothing moves in this scene: no methods are compared.")
+    return [*notes, *(f"Warning: {text}" for text in chart.warnings)]
 
 
 def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
@@ -125,7 +133,7 @@ def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
             items.append(f'<li class="{"head" if entry.strong else "note"}">{text}</li>')
             continue
         key = f" e{keys[entry.text]}" if entry.text in keys else ""
-        shape = mark(entry.look, 7, 7, 5)
+        shape = marker_svg(entry.look, 7, 7, 5)
         items.append(
             f'<li class="{"strong" if entry.strong else "faint"}{key}"><svg viewBox="0 0 14 14" '
             f'fill="{entry.look.colour}">{shape}</svg>{text}</li>'
@@ -133,7 +141,7 @@ def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
     return f'<ul class="keys">{"".join(items)}</ul>'
 
 
-def _left_out(entries: Sequence[Skipped]) -> str:
+def _skipped_html(entries: Sequence[Skipped]) -> str:
     parts = []
     for refused, heading in ((True, "Does not apply"), (False, "Left out")):
         items = [
@@ -145,7 +153,7 @@ def _left_out(entries: Sequence[Skipped]) -> str:
     return "".join(parts)
 
 
-def _html(table: Table) -> str:
+def _table_html(table: Table) -> str:
     head, numbers, rows = table
 
     def cells(row: Sequence[str], tag: str) -> str:

@@ -1,4 +1,4 @@
-"""The picture of a chart by matplotlib (extra: plot)."""
+"""Plot of a chart by matplotlib (extra: plot)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mstmm.safe_text import escape_control_characters
 
 from ..platform_support.safe_files import replace_atomically
 from .chart_record import ChartRecord
-from .plot_elements import Drawing, Entry, decades, drawing, time_text
+from .plot_elements import Drawing, Entry, build_drawing, decades, time_text
 
 _STYLE: dict[str, Any] = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
@@ -22,97 +22,97 @@ _STYLE: dict[str, Any] = {
     "axes.edgecolor": "#555555", "savefig.dpi": 150,
 }  # fmt: skip
 
-#: Letters of a line below the title.
-_LETTERS = 150
+#: Characters in a line of the subtitle.
+_SUBTITLE_COLUMNS = 150
 
-#: Inches: the figure, and how high a line of the legend is.
+#: Width and smallest height of the figure, and height of a legend row, inches.
 _WIDTH, _HEIGHT, _ROW = 9.4, 5.9, 0.155
 
 
 def has_matplotlib() -> bool:
-    """Whether matplotlib is there."""
+    """Whether matplotlib is installed."""
     return find_spec("matplotlib") is not None
 
 
 def plot(chart: ChartRecord, path: Path | None) -> Any:
-    """`matplotlib.figure.Figure`; written to `path` too where one is given.
+    """Plot a chart as `matplotlib.figure.Figure`, and write it to `path` if given.
 
-    Raises EnvironmentFailure without matplotlib, SceneError for an unknown ending.
+    Raises EnvironmentFailure without matplotlib, SceneError for an unknown file extension.
     """
     Figure = figure_class()
     import matplotlib as mpl
 
-    made = drawing(chart)
-    height = max(_HEIGHT, _ROW * len(made.legend) + 0.9)
+    drawing = build_drawing(chart)
+    height = max(_HEIGHT, _ROW * len(drawing.legend) + 0.9)
     style: Any = _STYLE
     with mpl.rc_context(style):
         figure = Figure(figsize=(_WIDTH, height))
         axes = figure.add_axes((0.085, 0.62 / height, 0.675, 1 - 1.36 / height))
-        _draw(axes, made)
-        _legend(figure, made.legend, height)
+        _draw_axes(axes, drawing)
+        _draw_legend(figure, drawing.legend, height)
         figure.text(
             0.085,
             1 - 0.1 / height,
-            escape_control_characters(made.title),
+            escape_control_characters(drawing.title),
             fontsize=12,
             va="top",
             weight="bold",
             parse_math=False,
         )
-        for i, line in enumerate(wrap(escape_control_characters(made.below), _LETTERS)):
+        for i, line in enumerate(wrap(escape_control_characters(drawing.below), _SUBTITLE_COLUMNS)):
             figure.text(0.085, 1 - (0.34 + 0.15 * i) / height, line, fontsize=8, va="top",
                         color="#555555", parse_math=False)  # fmt: skip
         if path is not None:
-            _write(figure, path)
+            _write_figure(figure, path)
     return figure
 
 
-def _draw(axes: Any, made: Drawing) -> None:
-    if made.empty:
+def _draw_axes(axes: Any, drawing: Drawing) -> None:
+    if drawing.empty:
         axes.set_axis_off()
-        axes.text(0.5, 0.5, made.empty, fontsize=11, ha="center", color="#555555",
+        axes.text(0.5, 0.5, drawing.empty, fontsize=11, ha="center", color="#555555",
                   transform=axes.transAxes)  # fmt: skip
         return
-    right = made.x[1]
-    if made.floor > right:
-        axes.axvspan(made.floor, right, color="#f1f1f1", zorder=0)
+    right = drawing.x[1]
+    if drawing.floor > right:
+        axes.axvspan(drawing.floor, right, color="#f1f1f1", zorder=0)
         axes.text(
-            made.floor, 0.985, " below what the reference can tell", fontsize=7, color="#777777",
+            drawing.floor, 0.985, " not resolved by the reference", fontsize=7, color="#777777",
             va="top", ha="left", rotation=90, transform=axes.get_xaxis_transform(),
         )  # fmt: skip
-    if len(made.front) > 1:
-        axes.plot(*zip(*made.front, strict=True), color="#111111", lw=7, alpha=0.16,
+    if len(drawing.front) > 1:
+        axes.plot(*zip(*drawing.front, strict=True), color="#111111", lw=7, alpha=0.16,
                   solid_capstyle="round", solid_joinstyle="round", zorder=3)  # fmt: skip
-    for line in made.lines:
-        places = [at for at, _ in line.points]
+    for line in drawing.lines:
+        positions = [position for position, _ in line.points]
         axes.plot(
-            *zip(*places, strict=True), color=line.look.colour, marker=line.look.mark or "None",
+            *zip(*positions, strict=True), color=line.look.colour, marker=line.look.mark or "None",
             ls="-" if line.joined else "None", lw=1.7 if line.strong else 0.8,
             ms=5 if line.strong else 3, mec="white", mew=0.5, alpha=1.0 if line.strong else 0.55,
             zorder=5 if line.strong else 2, clip_on=True,
         )  # fmt: skip
-    if made.front:
-        axes.plot(*zip(*made.front, strict=True), "o", ms=9, mfc="none", mec="#111111", mew=0.9,
+    if drawing.front:
+        axes.plot(*zip(*drawing.front, strict=True), "o", ms=9, mfc="none", mec="#111111", mew=0.9,
                   zorder=6)  # fmt: skip
-    for label in made.labels:
+    for label in drawing.labels:
         axes.annotate(
             label.text, label.place, (label.at[0], -label.at[1]), textcoords="offset points",
             ha="center", va="center", fontsize=8, zorder=7,
             bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.6},
         )  # fmt: skip
-    for at, colour, _ in made.own:
-        axes.plot([at, at], [0.0, 0.025], color=colour, lw=2.5, zorder=8, clip_on=False,
-                  transform=axes.get_xaxis_transform())  # fmt: skip
-    axes.set(xlim=made.x, ylim=made.y, xlabel=f"{made.x_label}  (more accurate to the right)",
-             ylabel=made.y_label)  # fmt: skip
-    powers = decades(*made.x)
-    axes.set_xticks(powers, [f"$10^{{{p}}}$" for p in powers])
-    times = decades(*made.y)
-    axes.set_yticks(times, [time_text(p) for p in times])
+    for log_error, colour, _ in drawing.own:
+        axes.plot([log_error, log_error], [0.0, 0.025], color=colour, lw=2.5, zorder=8,
+                  clip_on=False, transform=axes.get_xaxis_transform())  # fmt: skip
+    axes.set(xlim=drawing.x, ylim=drawing.y, ylabel=drawing.y_label,
+             xlabel=f"{drawing.x_label}  (more accurate to the right)")  # fmt: skip
+    powers = decades(*drawing.x)
+    axes.set_xticks(powers, [f"$10^{{{power}}}$" for power in powers])
+    times = decades(*drawing.y)
+    axes.set_yticks(times, [time_text(power) for power in times])
 
 
-def _legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
-    """Names below their headings, at the right."""
+def _draw_legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
+    """Draw the legend at the right: headings with names below."""
     for i, entry in enumerate(entries):
         y = 1 - (0.70 + _ROW * i) / height
         if entry.look is None:
@@ -138,9 +138,9 @@ def _legend(figure: Any, entries: Sequence[Entry], height: float) -> None:
                     color="#111111" if entry.strong else "#666666", parse_math=False)  # fmt: skip
 
 
-def _write(figure: Any, path: Path) -> None:
+def _write_figure(figure: Any, path: Path) -> None:
     kind = path.suffix.lower().lstrip(".")
     if kind not in figure.canvas.get_supported_filetypes():
-        raise SceneError(f'picture "{path}": expected a name that ends in .png, .svg or .pdf')
+        raise SceneError(f'plot file "{path}": expected a name that ends in .png, .svg or .pdf')
     with replace_atomically(path) as temporary:
         figure.savefig(temporary, format=kind)

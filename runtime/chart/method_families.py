@@ -1,4 +1,4 @@
-"""Methods of a chart: which there are, to which family they belong, and their settings."""
+"""Methods of a chart: names, families, and settings from cheap to accurate."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from ..run import classical_run, external_integrators
 from ..run.external_integrators import sundials
 from .chart_points import Setting
 
-#: Relative tolerances, loose to tight.
+#: Relative tolerances from loose to tight.
 TOLERANCES = tuple(10.0**-k for k in range(2, 13))
-#: Fixed steps in parts of the run, long to short: two to a decade.
+#: Fixed steps as fractions of the run from long to short, two per decade.
 STEPS = tuple(1.0 / round(10 ** (k / 2)) for k in range(3, 13))
 
-#: Methods that are the cheapest for many scenes: they are tried before time is short.
+#: Methods that are the cheapest for many scenes; they run first, while there is time.
 PROMISING = ("dop853", "rodas4p2", "rodas5p", "genalpha", "dopri5", AUTO)
 
-#: Families in the order of legends.
+#: Families of methods in the order of the legend.
 FAMILIES = (
     "choice", "explicit", "Rosenbrock", "diagonally implicit", "Newmark's", "exponential",
     "classical", "SciPy", "SUNDIALS",
@@ -29,29 +29,29 @@ FAMILIES = (
 _KINDS = {ROSENBROCK: 2, DIRK: 3, ALPHA: 4, EXPONENTIAL: 5}
 
 
-def every_method() -> tuple[str, ...]:
-    """All that `simulate` knows: own ones, the choice among them, the classical ones, others'."""
+def all_methods() -> tuple[str, ...]:
+    """Every method of `simulate`: built-in, "auto", classical, and of SciPy and SUNDIALS."""
     return (*names(), AUTO, *classical_run.METHODS, *external_integrators.METHODS)
 
 
-def checked_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
-    """These methods, once each, or all for None.
+def require_methods(methods: Sequence[str] | None) -> tuple[str, ...]:
+    """Validate names of methods and drop repeated ones; None means all methods.
 
-    SceneError for none at all, and, with the nearest name, for an unknown one.
+    Raises SceneError for an empty list, and, with the nearest name, for an unknown method.
     """
-    known = every_method()
+    valid = all_methods()
     if methods is None:
-        return known
+        return valid
     for name in methods:
-        if name not in known:
-            raise SceneError(f"method {name!r} is not known{did_you_mean(str(name), known)}")
+        if name not in valid:
+            raise SceneError(f"methods: unknown method {name!r}{did_you_mean(str(name), valid)}")
     if not len(methods):
-        raise SceneError("methods = []: expected one name or more; leave it out for all methods")
+        raise SceneError("methods = []: expected one or more names; omit it for all methods")
     return tuple(dict.fromkeys(methods))
 
 
-def without_twins(methods: Sequence[str]) -> tuple[str, ...]:
-    """For trees: without the methods on positions whose plain ones are there, which do the same."""
+def without_index3_duplicates(methods: Sequence[str]) -> tuple[str, ...]:
+    """Methods for scenes without loops, where an index-3 method repeats its plain counterpart."""
     return tuple(
         name
         for name in methods
@@ -60,7 +60,7 @@ def without_twins(methods: Sequence[str]) -> tuple[str, ...]:
 
 
 def family(method: str) -> str:
-    """One of FAMILIES."""
+    """Family of a method, one of FAMILIES."""
     if method == AUTO:
         return FAMILIES[0]
     if method in classical_run.METHODS:
@@ -72,16 +72,16 @@ def family(method: str) -> str:
     return FAMILIES[_KINDS.get(getattr(get(method), "kind", 0), 1)]
 
 
-def takes_fixed_steps(method: str) -> bool:
-    """Whether it can make fixed steps only."""
+def has_fixed_steps_only(method: str) -> bool:
+    """Whether a method has no step size control."""
     if method == AUTO or method in external_integrators.METHODS:
         return False
     return method in classical_run.METHODS or not get(method).adaptive
 
 
 def settings(method: str, model: str, t_end: float) -> Iterator[Setting]:
-    """Its settings from cheap to accurate."""
-    if takes_fixed_steps(method):
-        yield from (Setting(method, model, part * t_end, fixed=True) for part in STEPS)
+    """Settings of a method from cheap to accurate."""
+    if has_fixed_steps_only(method):
+        yield from (Setting(method, model, fraction * t_end, fixed=True) for fraction in STEPS)
     else:
         yield from (Setting(method, model, tolerance) for tolerance in TOLERANCES)

@@ -1,7 +1,7 @@
-"""All curves of a chart, from their cheap settings to their accurate ones.
+"""Run all methods of a chart on all model levels, from cheap to accurate settings.
 
-A curve is a method on a level of model.  All curves take their first setting, then all their
-second one, so that where time ends the accurate settings are missing and not whole methods.
+A curve is a method on a model level.  All curves run their first setting, then all their second
+one, so that a lack of time drops the most accurate settings and no whole methods.
 """
 
 from __future__ import annotations
@@ -13,30 +13,31 @@ from typing import TYPE_CHECKING
 from ..result.error_measure import Measure
 from .chart_points import Point, Setting, Skipped
 from .method_families import settings
-from .trial_run import Runs, Trial, error_of, factorizations
+from .trial_run import Runs, Trial, factorization_count, max_error
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: The next setting costs this many times the last one where a curve has one point, and at most
-#: and at least so many times where it has two.
-_GROWTH, _MOST, _LEAST = 2.0, 10.0, 1.0
+#: Estimated growth of CPU time from one setting to the next: after one point, and the largest and
+#: smallest growth assumed after two.
+_GROWTH, _MAX_GROWTH, _MIN_GROWTH = 2.0, 10.0, 1.0
 
-#: Processor time (s) beside which the loading of a method does not count.
-_LOADING = 1.0
+#: CPU time (s) beyond which the loading of a method is negligible.
+_LOADING_LIMIT = 1.0
 
-#: Why a curve ends before its last setting.
-_NO_TIME = "it would have taken more than its part of the time left"
+#: Reason why a curve ends before its last setting.
+_NO_TIME = "too little time left"
 
-#: A level of model errs by so much that settings nearer to its own error show nothing more.
-_NEAR = 1.1
+#: A curve ends once its error is within this factor of the error of its model level.
+_LEVEL_ERROR_FACTOR = 1.1
 
 
 @dataclass
 class Curve:
-    """A method on a level of model, with what is known of it so far.
+    """Curve of a chart: a method on a model level, its remaining settings, and costs so far.
 
-    `enough` is the error at which it ends: what the reference can tell, or the level's own.
+    The curve ends at the error `enough`: the smallest one that the reference resolves, or the error
+    of the model level; `why_enough` states which.  `costs` are CPU times, s.
     """
 
     method: str
@@ -49,28 +50,32 @@ class Curve:
 
     @property
     def expected(self) -> float:
-        """Seconds that the next setting will take, about; 0 where nothing is known."""
+        """Estimated CPU time of the next setting, s; 0 if unknown."""
         if not self.costs:
             return 0.0
         growth = _GROWTH
         if len(self.costs) > 1 and self.costs[-2] > 0:
-            growth = min(max(self.costs[-1] / self.costs[-2], _LEAST), _MOST)
+            growth = min(max(self.costs[-1] / self.costs[-2], _MIN_GROWTH), _MAX_GROWTH)
         return growth * self.costs[-1]
 
 
-def curve(
-    method: str, level: str, model: Model, t_end: float, floor: float, own: float | None
+def method_curve(
+    method: str, level: str, model: Model, t_end: float, floor: float, level_error: float | None
 ) -> Curve:
-    """The curve of a method on a level whose own error is `own`, None for the reference's."""
-    enough, why = floor, "the reference can tell no smaller errors"
-    if own is not None and _NEAR * own > floor:
-        enough, why = _NEAR * own, "what is left is the error of the level of model"
+    """Curve of a method on a model level whose error is `level_error`, None for the reference.
+
+    `floor` is the smallest error that the reference resolves.
+    """
+    enough, why = floor, "the reference does not resolve smaller errors"
+    if level_error is not None and _LEVEL_ERROR_FACTOR * level_error > floor:
+        enough = _LEVEL_ERROR_FACTOR * level_error
+        why = "the remaining error is that of the model level"
     return Curve(method, level, model, enough, why, settings(method, level, t_end))
 
 
 @dataclass
 class SurveyResult:
-    """What a survey gives: points, the models to repeat them with, and what was left out."""
+    """Points of a survey, the model of each point, and what was skipped."""
 
     points: list[Point] = field(default_factory=list)
     models: list[Model] = field(default_factory=list)
@@ -78,7 +83,7 @@ class SurveyResult:
 
 
 class Survey:
-    """Runs curves against a reference within their part of the budget; `found` fills."""
+    """Run of all curves within a time budget; collects points in `found`."""
 
     def __init__(
         self, reference: Trial, measure: Measure, runs: Runs, tell: Callable[[str], None]
@@ -87,63 +92,69 @@ class Survey:
         self.found = SurveyResult()
 
     def make(self, curves: list[Curve], part: float) -> SurveyResult:
-        """All of them, a setting of each at a time, until this part of the budget is spent."""
+        """Run all curves, one setting of each in turn, until this part of the budget is spent."""
         while curves:
             waiting = len(curves)
             curves = [
-                one for one in curves if self._advance(one, self.runs.budget.share(part, waiting))
+                curve
+                for curve in curves
+                if self._run_next(curve, self.runs.budget.share(part, waiting))
             ]
         return self.found
 
-    def _advance(self, one: Curve, limit: float) -> bool:
-        """One setting of one curve; False where the curve ends."""
-        setting = next(one.ahead, None)
+    def _run_next(self, curve: Curve, limit: float) -> bool:
+        """Run the next setting of a curve within `limit` s; return False if the curve ends."""
+        setting = next(curve.ahead, None)
         if setting is None:
             return False
-        if not limit or one.expected > limit:
-            self._left(one, f"{setting} and on", _NO_TIME)
+        if not limit or curve.expected > limit:
+            self._skip(curve, f"{setting} and tighter", _NO_TIME)
             return False
-        self.tell(f"{one.level}: {one.method}, {setting}")
-        trial = self.runs.trial(one.model, setting, self.measure, limit)
-        if not one.costs and trial.numbers is not None and _may_be_first(trial, one.model):
-            trial = self.runs.trial(one.model, setting, self.measure, limit)
-        one.costs.append(trial.cpu_s)
+        self.tell(f"{curve.level}: {curve.method}, {setting}")
+        trial = self.runs.trial(curve.model, setting, self.measure, limit)
+        if (
+            not curve.costs
+            and trial.numbers is not None
+            and _may_include_loading(trial, curve.model)
+        ):
+            trial = self.runs.trial(curve.model, setting, self.measure, limit)
+        curve.costs.append(trial.cpu_s)
         if trial.refused:
-            self._left(one, "", trial.failure, refused=True)
+            self._skip(curve, "", trial.failure, refused=True)
             return False
-        point = point_of(trial, self.reference, self.measure)
+        point = chart_point(trial, self.reference, self.measure)
         self.found.points.append(point)
-        self.found.models.append(one.model)
-        return not (trial.late or self._enough(one, point))
+        self.found.models.append(curve.model)
+        return not (trial.late or self._is_accurate_enough(curve, point))
 
-    def _enough(self, one: Curve, point: Point) -> bool:
-        """Whether tighter settings would show nothing more."""
-        if point.error is None or point.error > one.enough:
+    def _is_accurate_enough(self, curve: Curve, point: Point) -> bool:
+        """Whether tighter settings cannot show smaller errors; skips the next one if so."""
+        if point.error is None or point.error > curve.enough:
             return False
-        following = next(one.ahead, None)
+        following = next(curve.ahead, None)
         if following is not None:
-            self._left(one, f"{following} and on", one.why_enough)
+            self._skip(curve, f"{following} and tighter", curve.why_enough)
         return True
 
-    def _left(self, one: Curve, setting: str, why: str, refused: bool = False) -> None:
-        self.found.left_out.append(Skipped(one.method, one.level, setting, why, refused))
+    def _skip(self, curve: Curve, setting: str, reason: str, refused: bool = False) -> None:
+        self.found.left_out.append(Skipped(curve.method, curve.level, setting, reason, refused))
 
 
-def _may_be_first(trial: Trial, model: Model) -> bool:
-    """Whether the time of a first call may be that of loading a method, or of compiling for it."""
-    return trial.cpu_s < _LOADING or model.engine != "looped"
+def _may_include_loading(trial: Trial, model: Model) -> bool:
+    """Whether the CPU time of a first call may include loading or compiling the method."""
+    return trial.cpu_s < _LOADING_LIMIT or model.engine != "looped"
 
 
-def point_of(trial: Trial, reference: Trial, measure: Measure) -> Point:
-    """The point of a run, not yet judged beside the others."""
+def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
+    """Point of a run, without error bound."""
     if trial.numbers is None:
         return Point(trial.setting, failure=trial.failure)
-    error, counts = error_of(trial, reference, measure), trial.statistics
+    error, counts = max_error(trial, reference, measure), trial.statistics
     if isinstance(error, str):
         return Point(trial.setting, failure=error)
     return Point(
         trial.setting, error, trial.cpu_s, 1,
-        None if counts is None else counts.evaluations, factorizations(trial.setting, counts),
+        None if counts is None else counts.evaluations, factorization_count(trial.setting, counts),
         None if counts is None else counts.steps,
         warnings=trial.warnings, too_coarse=trial.too_coarse,
     )  # fmt: skip

@@ -1,7 +1,7 @@
-"""Levels of model of a scene: rigid, one-way, linear and stiffened with 1 to n shapes.
+"""Model levels of a scene: rigid, one-way, linear and stiffened with 1 to n shapes.
 
-A level is the scene with other tables; what a level leaves out is what its error tells.  Bodies
-that the scene itself makes rigid stay rigid.
+A level is the scene with other tables of bodies; its error shows the effect that it neglects.
+Bodies that are rigid in the scene stay rigid.
 """
 
 from __future__ import annotations
@@ -23,98 +23,110 @@ from ..packing.flexible.rigid_substitution import LEVELS
 
 @dataclass(frozen=True)
 class Variant:
-    """A level of model before it is compiled."""
+    """Model level before compilation: name and scene."""
 
     name: str
     scene: Scene
 
 
-def ladder(scene: Scene) -> tuple[Variant, ...]:
-    """Levels from the smallest to the richest, all flexible bodies on one level; a scene without
-    flexible bodies has one.  The shapes of an elastic body are those beside its static ones."""
-    modes = modes_of(scene)
-    soft = [free_modes(body) for body in scene.elastic if body.model != "rigid"]
-    most = max([0, *soft, *(max(counts.counts) for counts in modes.values())])
-    if not most:
+def model_levels(scene: Scene) -> tuple[Variant, ...]:
+    """Model levels from the smallest to the richest, all flexible bodies on the same level.
+
+    A scene without flexible bodies has one level.  For an elastic body the number of shapes counts
+    its vibration shapes; its static shapes are always kept.
+    """
+    modes = beam_modes(scene)
+    elastic_counts = [vibration_mode_count(body) for body in scene.elastic if body.model != "rigid"]
+    max_count = max([0, *elastic_counts, *(max(counts.counts) for counts in modes.values())])
+    if not max_count:
         return (Variant("rigid", scene),)
-    found = [Variant("rigid", at_level(scene, "rigid"))]
+    levels = [Variant("rigid", with_model_level(scene, "rigid"))]
     for word, level, stiffening in (
         ("one-way", "one-way", True), ("linear", "coupled", False), ("stiffened", "coupled", True),
     ):  # fmt: skip
-        for n in range(1, most + 1):
-            cut = at_level(limit_modes(scene, modes, n, stiffening), level)
-            found.append(Variant(f"{word}, {n} shape{'s' if n > 1 else ''}", cut))
-    return tuple(found)
+        for n in range(1, max_count + 1):
+            limited = with_model_level(limit_modes(scene, modes, n, stiffening), level)
+            levels.append(Variant(f"{word}, {n} shape{'s' if n > 1 else ''}", limited))
+    return tuple(levels)
 
 
-def modes_of(scene: Scene) -> dict[str, Modes]:
-    """Shapes by direction of the beams that deform, also where the scene leaves them open."""
-    coupled = at_level(scene, "coupled")
+def beam_modes(scene: Scene) -> dict[str, Modes]:
+    """Number of shapes by direction of each flexible beam, also where the scene leaves it open."""
+    coupled = with_model_level(scene, "coupled")
     bodies = BeamBodies(coupled)
     return {beam.name: bodies.modes(beam) for beam in coupled.beam if beam.model != "rigid"}
 
 
-def at_level(scene: Scene, level: str) -> Scene:
-    """The scene with one level of model, a key of LEVELS, for all bodies that deform in it."""
+def with_model_level(scene: Scene, level: str) -> Scene:
+    """The scene with one model level, a key of LEVELS, for all its flexible bodies."""
     change = {"model": LEVELS[level]}
 
-    def changed(body: Any) -> Any:
+    def at_level(body: Any) -> Any:
         return body if body.model == "rigid" else body.model_copy(update=change)
 
     return with_tables(
-        scene, beam=tuple(map(changed, scene.beam)), elastic=tuple(map(changed, scene.elastic))
+        scene, beam=tuple(map(at_level, scene.beam)), elastic=tuple(map(at_level, scene.elastic))
     )
 
 
 def limit_modes(scene: Scene, modes: Mapping[str, Modes], n: int, stiffening: bool) -> Scene:
-    """The scene with at most n shapes in each direction of its flexible bodies."""
+    """The scene with at most n shapes per direction in its flexible bodies."""
     change: dict[str, Any] = {"stiffening": stiffening}
     beams = tuple(
-        with_shapes(beam, modes[beam.name], _at_most(modes[beam.name], n)).model_copy(update=change)
+        with_mode_counts(beam, modes[beam.name], _limited_counts(modes[beam.name], n)).model_copy(
+            update=change
+        )
         if beam.name in modes
         else beam
         for beam in scene.beam
     )
     bodies = tuple(
-        body.model_copy(update=change | {"modes": min(n, free_modes(body))})
+        body.model_copy(update=change | {"modes": min(n, vibration_mode_count(body))})
         for body in scene.elastic
     )
     return with_tables(scene, beam=beams, elastic=bodies)
 
 
-def with_shapes(beam: Beam, whole: Modes, kept: Modes) -> Beam:
-    """A beam of `whole` shapes with the first ones of each direction alone; what is given per
-    shape goes along where there is one number for each."""
+def with_mode_counts(beam: Beam, whole: Modes, kept: Modes) -> Beam:
+    """A beam with only the first shapes of each direction.
+
+    `whole` are the numbers of shapes of the beam, `kept` those of the result.  Initial values and
+    damping ratios that are given per shape are cut accordingly.
+    """
     update: dict[str, Any] = {"modes": kept}
     if beam.shapes is not None:
-        cut = {word: getattr(beam.shapes, word)[: getattr(kept, word)] for word in DIRECTIONS}
-        update["shapes"] = Shapes.model_construct(**cut)
-    places = [i for i, name in enumerate(whole.names) if name in kept.names]
+        shapes = {
+            direction: getattr(beam.shapes, direction)[: getattr(kept, direction)]
+            for direction in DIRECTIONS
+        }
+        update["shapes"] = Shapes.model_construct(**shapes)
+    kept_indices = [i for i, name in enumerate(whole.names) if name in kept.names]
 
-    def cut_to(values: tuple[float, ...] | None) -> tuple[float, ...] | None:
-        one_each = values is not None and len(values) == whole.total
-        return tuple(values[i] for i in places) if values is not None and one_each else values
+    def kept_values(values: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        if values is None or len(values) != whole.total:
+            return values
+        return tuple(values[i] for i in kept_indices)
 
-    start = {"eta": cut_to(beam.initial.eta), "etad": cut_to(beam.initial.etad)}
-    update["initial"] = beam.initial.model_copy(update=start)
-    update["damping"] = beam.damping.model_copy(update={"ratio": cut_to(beam.damping.ratio)})
+    initial = {"eta": kept_values(beam.initial.eta), "etad": kept_values(beam.initial.etad)}
+    update["initial"] = beam.initial.model_copy(update=initial)
+    update["damping"] = beam.damping.model_copy(update={"ratio": kept_values(beam.damping.ratio)})
     return beam.model_copy(update=update)
 
 
 def with_tables(scene: Scene, **tables: Any) -> Scene:
-    """The scene with other tables, which need no check; of its names those of what is there."""
+    """The scene with other tables, not validated; `names` keeps only existing elements."""
     fields = {key: getattr(scene, key) for key in type(scene).model_fields} | tables
-    found = Scene.model_construct(**fields)
+    changed = Scene.model_construct(**fields)
     if scene.names == Names():
-        return found
-    names = scene.names.among(BodyReferences(found.skeleton), found.hinges.by_name)
+        return changed
+    names = scene.names.among(BodyReferences(changed.skeleton), changed.hinges.by_name)
     return Scene.model_construct(**(fields | {"names": names}))
 
 
-def _at_most(modes: Modes, n: int) -> Modes:
-    return Modes(**{word: min(n, getattr(modes, word)) for word in DIRECTIONS})
+def _limited_counts(modes: Modes, n: int) -> Modes:
+    return Modes(**{direction: min(n, getattr(modes, direction)) for direction in DIRECTIONS})
 
 
-def free_modes(body: Elastic) -> int:
-    """Vibration shapes of an elastic body beside its static ones."""
+def vibration_mode_count(body: Elastic) -> int:
+    """Number of vibration shapes of an elastic body, without its static shapes."""
     return AUTO_MODES if body.modes is None else body.modes

@@ -1,4 +1,4 @@
-"""Colours and marks: methods by their family, levels of model by their rank."""
+"""Colours and markers of a chart: by family of methods, and by model level."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ _RANGES = (
     ("#a9a9a9", "#5f5f5f"),
 )  # fmt: skip
 
-#: Marks by name as matplotlib has them, and as corners on a circle of radius 1 (y downwards).
+#: Markers by their matplotlib name, as corners in units of the marker radius (y downwards); a
+#: circle has none.
 MARKS: dict[str, tuple[tuple[float, float], ...]] = {
     "o": (),
     "s": ((-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)),
@@ -40,60 +41,60 @@ MARKS: dict[str, tuple[tuple[float, float], ...]] = {
     ),
     "h": ((0.0, -1.1), (0.95, -0.55), (0.95, 0.55), (0.0, 1.1), (-0.95, 0.55), (-0.95, -0.55)),
 }
-_MARK_OF = ("*", "s", "o", "p", "^", "v", "h", "D", "P")
+_FAMILY_MARKS = ("*", "s", "o", "p", "^", "v", "h", "D", "P")
 
-#: Levels of model from the smallest to the richest, and planar ones (Okabe and Ito 2008, darkened).
-_LEVELS = ("#7a7a7a", "#c98a00", "#3a9bd9", "#c0392b", "#1f7a4d")
+#: Colours by `_COLOUR_INDEX` of the model level (Okabe and Ito 2008, darkened).
+_LEVEL_COLOURS = ("#7a7a7a", "#c98a00", "#3a9bd9", "#c0392b", "#1f7a4d")
 
 
 @dataclass(frozen=True)
 class PlotStyle:
-    """Colour, and a key of MARKS."""
+    """Colour, and marker as a key of MARKS."""
 
     colour: str
     mark: str
 
 
-def of_methods(methods: Sequence[str]) -> dict[str, PlotStyle]:
-    """A look for each method; those of a family go from light to dark."""
-    found = {}
-    for name, (light, dark), mark in zip(FAMILIES, _RANGES, _MARK_OF, strict=True):
-        own = [method for method in methods if family(method) == name]
-        for i, method in enumerate(own):
-            part = i / (len(own) - 1) if len(own) > 1 else 1.0
-            found[method] = PlotStyle(_between(light, dark, part), mark)
-    return found
+def method_styles(methods: Sequence[str]) -> dict[str, PlotStyle]:
+    """Style of each method; the colours of a family go from light to dark."""
+    styles = {}
+    for name, (light, dark), mark in zip(FAMILIES, _RANGES, _FAMILY_MARKS, strict=True):
+        family_methods = [method for method in methods if family(method) == name]
+        for i, method in enumerate(family_methods):
+            fraction = i / (len(family_methods) - 1) if len(family_methods) > 1 else 1.0
+            styles[method] = PlotStyle(_mix_colours(light, dark, fraction), mark)
+    return styles
 
 
-def of_levels(levels: Sequence[str]) -> dict[str, str]:
-    """A colour for each level of model: one for each kind, darker with more shapes."""
-    kinds = list(dict.fromkeys(map(_kind, levels)))
-    found = {}
+def level_colours(levels: Sequence[str]) -> dict[str, str]:
+    """Colour of each model level: one per kind, darker with more shapes."""
+    kinds = list(dict.fromkeys(map(_level_kind, levels)))
+    colours = {}
     for kind in kinds:
-        own = [level for level in levels if _kind(level) == kind]
-        base = _LEVELS[_RANK.get(kind, 0)]
-        for i, level in enumerate(own):
-            part = (len(own) - 1 - i) / max(1, len(own))
-            found[level] = _between(base, "#ffffff", 0.6 * part)
-    return found
+        kind_levels = [level for level in levels if _level_kind(level) == kind]
+        base = _LEVEL_COLOURS[_COLOUR_INDEX.get(kind, 0)]
+        for i, level in enumerate(kind_levels):
+            fraction = (len(kind_levels) - 1 - i) / max(1, len(kind_levels))
+            colours[level] = _mix_colours(base, "#ffffff", 0.6 * fraction)
+    return colours
 
 
-_RANK = {"rigid": 0, "one-way": 1, "linear": 2, "stiffened": 3, "planar": 4}
+_COLOUR_INDEX = {"rigid": 0, "one-way": 1, "linear": 2, "stiffened": 3, "planar": 4}
 
 
-def _kind(level: str) -> str:
+def _level_kind(level: str) -> str:
     return level.partition(",")[0]
 
 
-def mark_of(method: str) -> str:
-    """The mark of a method's family."""
-    return _MARK_OF[FAMILIES.index(family(method))]
+def family_mark(method: str) -> str:
+    """Marker of the family of a method."""
+    return _FAMILY_MARKS[FAMILIES.index(family(method))]
 
 
-def _between(a: str, b: str, part: float) -> str:
-    """The colour between two, by parts of red, green and blue."""
+def _mix_colours(a: str, b: str, fraction: float) -> str:
+    """Colour at a fraction between two, in red, green and blue."""
     ends = zip(_rgb(a), _rgb(b), strict=True)
-    return "#" + "".join(f"{round(x + part * (y - x)):02x}" for x, y in ends)
+    return "#" + "".join(f"{round(x + fraction * (y - x)):02x}" for x, y in ends)
 
 
 def _rgb(colour: str) -> tuple[int, int, int]:

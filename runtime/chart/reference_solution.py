@@ -1,9 +1,9 @@
-"""The reference: runs by methods of high order at tight tolerances, which have to agree.
+"""Reference solution: high-order methods at tight tolerances that must agree.
 
-Every candidate runs at two tolerances or more.  The reference is the run whose distances to its own
-looser run and to the nearest run of another method are least; the larger of the two is the error
-stated for it.  Where one candidate alone came to two runs, the distance of those two is all there
-is, and is said to be.
+Every candidate runs at two tolerances or more.  The reference is the run that agrees best with a
+looser run of the same method and with the nearest run of another method; its stated error is the
+larger of these two differences.  If only one candidate completes two runs, the error is their
+difference, and the description says so.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from mstmm.errors import NumericalFailure
 from ..result.error_measure import Measure
 from .chart_points import Setting
 from .method_families import family
-from .time_budget import REFERENCE, Budget
-from .trial_run import Runs, Trial, error_of
+from .time_budget import REFERENCE
+from .trial_run import Runs, Trial, max_error
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: Method -> relative tolerances, loose to tight: explicit ones of orders 8 and 13, implicit ones of
-#: order 5 and two kinds.
+#: Method -> relative tolerances, loose to tight: explicit methods of orders 8 and 13, implicit
+#: methods of order 5 of two families.
 CANDIDATES: Mapping[str, Sequence[float]] = {
     "dop853": (1e-10, 1e-12, 1e-13),
     "pirk13": (1e-10, 1e-12, 1e-13),
@@ -35,15 +35,15 @@ CANDIDATES: Mapping[str, Sequence[float]] = {
     "kvaerno5": (1e-8, 1e-10, 1e-11),
 }
 
-#: A tolerance a hundred times tighter is expected to cost this many times as much at most.
+#: Largest expected growth of CPU time for a tolerance a hundred times tighter.
 _GROWTH = 4.0
 
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class Converged:
-    """The reference run, its error, and how it was made in words."""
+    """Reference run, its error, and a description of the runs it was compared with."""
 
     run: Trial
     error: float
@@ -51,93 +51,94 @@ class Converged:
 
 
 def compute_reference(
-    model: Model, name: str, measure: Measure, runs: Runs, tell: Tell
+    model: Model, name: str, measure: Measure, runs: Runs, report: Report
 ) -> Converged:
-    """The reference of a model of this name.
+    """Compute the reference solution of a model; `name` is the name of its level.
 
-    Raises NumericalFailure with the reasons if no candidate came to two runs.
+    Raises NumericalFailure with the reasons if no candidate completes two runs.
     """
-    made: dict[str, list[Trial]] = {}
+    trials_by_method: dict[str, list[Trial]] = {}
     reasons: list[str] = []
-    too_short = False
-    late: set[str] = set()
+    is_short_of_time = False
+    slow_families: set[str] = set()
     for method, tolerances in CANDIDATES.items():
-        if family(method) in late:
-            reasons.append(f"{method}: left out, for its family takes too long")
+        if family(method) in slow_families:
+            reasons.append(f"{method}: skipped, its family of methods takes too long")
             continue
-        found, why, slow = _tightening(model, name, method, tolerances, measure, runs, tell)
-        too_short |= slow
-        if why:
-            reasons.append(f"{method}: {why}")
-        if slow and len(found) < 2:
-            late.add(family(method))
-        if len(found) > 1:
-            made[method] = found
-    if not made:
-        why = "; ".join(reasons)
-        if not too_short:
-            raise NumericalFailure(f"no reference was found: {why}")
-        raise NumericalFailure(
-            f"no reference was found within its part of the budget: {why}; give more budget, or "
-            "end earlier"
+        trials, reason, is_slow = _run_candidate(
+            model, name, method, tolerances, measure, runs, report
         )
-    return _best(made, measure)
+        is_short_of_time |= is_slow
+        if reason:
+            reasons.append(f"{method}: {reason}")
+        if is_slow and len(trials) < 2:
+            slow_families.add(family(method))
+        if len(trials) > 1:
+            trials_by_method[method] = trials
+    if not trials_by_method:
+        reason = "; ".join(reasons)
+        if not is_short_of_time:
+            raise NumericalFailure(f"no reference was found: {reason}")
+        raise NumericalFailure(
+            f"no reference was found within its part of the budget: {reason}; give a larger budget "
+            "or an earlier end time"
+        )
+    return _select_reference(trials_by_method, measure)
 
 
-def _tightening(
+def _run_candidate(
     model: Model, name: str, method: str, tolerances: Sequence[float], measure: Measure,
-    runs: Runs, tell: Tell,
+    runs: Runs, report: Report,
 ) -> tuple[list[Trial], str, bool]:  # fmt: skip
-    """Runs that ended well, loose to tight; why there are no tighter ones; whether that was for
-    want of time."""
-    found: list[Trial] = []
+    """Run a method at its tolerances from loose to tight, until one fails or time is short.
+
+    Returns the successful runs, the reason why there are no tighter ones, and whether that was a
+    lack of time.
+    """
+    trials: list[Trial] = []
     for tolerance in tolerances:
         setting = Setting(method, name, tolerance)
-        limit = _limit(runs.budget)
-        if found and _GROWTH * found[-1].cpu_s > limit:
-            return found, f"{setting} would take too long", True
-        tell(f"reference by {method}, {setting}")
+        limit = runs.budget.left(REFERENCE) / 2  # the other half leaves time for another method
+        if trials and _GROWTH * trials[-1].cpu_s > limit:
+            return trials, f"{setting} would take too long", True
+        report(f"reference by {method}, {setting}")
         trial = runs.trial(model, setting, measure, limit)
         if trial.numbers is None:
-            return found, f"{setting}: {trial.failure}", trial.late
-        found.append(trial)
-    return found, "", False
+            return trials, f"{setting}: {trial.failure}", trial.late
+        trials.append(trial)
+    return trials, "", False
 
 
-def _limit(budget: Budget) -> float:
-    """Seconds for one run: half of what is left, so that another method has its turn."""
-    return budget.left(REFERENCE) / 2
-
-
-def _best(made: Mapping[str, list[Trial]], measure: Measure) -> Converged:
-    """The run that agrees best with its own looser one and with another method."""
-    measure.scale_by(_numbers(next(iter(made.values()))[-1]))
-    judged = []
-    for method, trials in made.items():
+def _select_reference(trials_by_method: Mapping[str, list[Trial]], measure: Measure) -> Converged:
+    """Run that agrees best with a looser run of its method and with another method."""
+    measure.scale_by(_measured_values(next(iter(trials_by_method.values()))[-1]))
+    candidates = []
+    for method, trials in trials_by_method.items():
         run, looser = trials[-1], trials[-2]
-        others = {
-            other: _apart(run, theirs[-1], measure)
-            for other, theirs in made.items()
+        distances = {
+            other: _distance(run, other_trials[-1], measure)
+            for other, other_trials in trials_by_method.items()
             if other != method
         }
-        partner = min(others, key=lambda name: others[name], default="")
-        error = max(_apart(looser, run, measure), others.get(partner, 0.0))
-        judged.append((error, method, partner))
-    error, method, partner = min(judged)
+        partner = min(distances, key=lambda name: distances[name], default="")
+        error = max(_distance(looser, run, measure), distances.get(partner, 0.0))
+        candidates.append((error, method, partner))
+    error, method, partner = min(candidates)
     if not np.isfinite(error):
-        raise NumericalFailure("no reference was found: its runs do not reach the same end")
-    run, looser = made[method][-1], made[method][-2]
-    measure.scale_by(_numbers(run))
+        raise NumericalFailure("no reference was found: the runs end at different times")
+    run, looser = trials_by_method[method][-1], trials_by_method[method][-2]
+    measure.scale_by(_measured_values(run))
     text = f"{method} with {run.setting}, compared with {looser.setting}"
-    text += f" and with {partner}, {made[partner][-1].setting}" if partner else " alone"
+    text += f" and with {partner}, {trials_by_method[partner][-1].setting}" if partner else " only"
     return Converged(run, error, text)
 
 
-def _numbers(trial: Trial) -> Array:
+def _measured_values(trial: Trial) -> Array:
     assert trial.numbers is not None
     return trial.numbers
 
 
-def _apart(a: Trial, b: Trial, measure: Measure) -> float:
-    found = error_of(a, b, measure)
-    return found if isinstance(found, float) else np.inf
+def _distance(a: Trial, b: Trial, measure: Measure) -> float:
+    """Largest difference of two runs; inf if they end at different times."""
+    error = max_error(a, b, measure)
+    return error if isinstance(error, float) else np.inf

@@ -1,4 +1,4 @@
-"""Processor times taken again in alternating rounds, each point once in every round."""
+"""Repeat the measurement of CPU times in rounds, each point once in every round."""
 
 from __future__ import annotations
 
@@ -13,41 +13,45 @@ from .trial_run import Runs
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: Runs that take more than this part of the time for all rounds are not made again: their times
-#: vary little, and others would lose theirs.
-_LONG = 50.0
+#: Runs that take more than the remaining time over this number are not repeated: their times vary
+#: little, and they would leave too little time for the others.
+_MIN_RUNS = 50.0
 
-#: Processor time (s) that short runs fill with calls in one round, and how many calls at most.
-_FILLED, _CALLS = 5e-3, 5
+#: In each round a short run is called repeatedly up to this CPU time (s) and number of calls.
+_ROUND_CPU_S, _MAX_CALLS = 5e-3, 5
 
 
 def repeat_timings(
-    points: list[Point], models: list[Model], rounds: int, runs: Runs, tell: Callable[[str], None]
+    points: list[Point],
+    models: list[Model],
+    rounds: int,
+    runs: Runs,
+    report: Callable[[str], None],
 ) -> tuple[list[Point], int]:
-    """The points with the least time of all their runs; and how many missed a round.
+    """Repeat the timing of points; return them, and how many missed at least one round.
 
-    A round takes the cheap points first and leaves out those that no longer fit into the budget;
-    runs so long that a few of them would fill it have no part in rounds.
+    CPU times become the smallest of all runs.  A round runs cheap points first, and skips points
+    that no longer fit into the budget; very long runs are not repeated.
     """
     timed = list(points)
-    longest = runs.budget.left() / _LONG
-    times = {i: p.cpu_s for i, p in enumerate(points) if p.cpu_s is not None}
+    longest = runs.budget.left() / _MIN_RUNS
+    times = {i: point.cpu_s for i, point in enumerate(points) if point.cpu_s is not None}
     order = sorted((i for i in times if times[i] <= longest), key=lambda i: (times[i], i))
     missed: set[int] = set()
     for number in range(rounds):
-        tell(f"times taken again, round {number + 1} of {rounds}")
-        rest = rounds - number
-        kept = runs.budget.left() * (rest - 1) / rest  # for the rounds that follow
-        missed |= {i for i in order if not _again(timed, i, models[i], runs, kept)}
+        report(f"repeat timings, round {number + 1} of {rounds}")
+        remaining = rounds - number
+        reserved = runs.budget.left() * (remaining - 1) / remaining  # for the later rounds
+        missed |= {i for i in order if not _time_point(timed, i, models[i], runs, reserved)}
     return timed, len(missed) + len(times) - len(order)
 
 
-def _again(timed: list[Point], i: int, model: Model, runs: Runs, kept: float) -> bool:
-    """Time one point again; False where that would take of the time that is kept."""
+def _time_point(timed: list[Point], i: int, model: Model, runs: Runs, reserved: float) -> bool:
+    """Time point i again; return False if that would use the reserved time (s)."""
     point = timed[i]
     assert point.cpu_s is not None
-    left, once = runs.budget.left() - kept, max(point.cpu_s, 1e-6)
-    calls = max(1, min(_CALLS, int(_FILLED / once)))
+    left, once = runs.budget.left() - reserved, max(point.cpu_s, 1e-6)
+    calls = max(1, min(_MAX_CALLS, int(_ROUND_CPU_S / once)))
     if calls * once > left:
         return False
     try:

@@ -1,4 +1,4 @@
-"""What a chart says in words and tables, on the terminal and in its page."""
+"""Tables and sentences of a chart, for the terminal and the HTML page."""
 
 from __future__ import annotations
 
@@ -9,47 +9,47 @@ from mstmm.errors import MstmmError
 from .chart_points import Point, Skipped
 from .chart_record import ChartRecord
 
-#: Of a point whose error may be the reference's own.
-LIMITED = "not more than the reference's own error"
+#: Note on a point whose error may be that of the reference.
+_LIMITED = "error not resolved by the reference"
 
-#: Headings, the columns that hold numbers, rows.
+#: Headings, indices of the columns that hold numbers, rows.
 Table = tuple[Sequence[str], Sequence[int], Sequence[Sequence[str]]]
 
 
 def recommendation(chart: ChartRecord) -> str:
-    """The cheapest setting for the error wanted, or why there is none."""
-    asked = f"for an error of {chart.wanted:.2g}{_unit(chart)}"
+    """The cheapest setting for the target error, or why there is none."""
+    target = f"for an error of {chart.wanted:.2g}{_unit(chart)}"
     try:
         best = chart.recommended()
     except MstmmError as problem:
-        return f"{asked}: nothing to recommend, {problem}"
-    level = f" on the model {best.model}" if len(chart.levels) > 1 else ""
-    warned = "".join(f"; it warns: {text}" for text in best.warnings)
+        return f"{target}: no recommendation: {problem}"
+    level = f" on the model level {best.model}" if len(chart.levels) > 1 else ""
+    warnings = "".join(f"; warning: {text}" for text in best.warnings)
     return (
-        f"{asked}: {best.method}, {best.setting}{level}, {time_of(best.cpu_s or 0.0)} CPU, error "
-        f"{best.error:.1e}{warned}"
+        f"{target}: {best.method}, {best.setting}{level}, {format_time(best.cpu_s or 0.0)} CPU, "
+        f"error {best.error:.1e}{warnings}"
     )
 
 
-def advice(chart: ChartRecord) -> Table:
-    """The cheapest setting for every power of ten that one meets."""
-    head = ("error asked", "method", "setting", "model", "CPU time", "error", "warnings")
+def recommendation_table(chart: ChartRecord) -> Table:
+    """The cheapest setting for every power of ten that is reached as error."""
+    head = ("target error", "method", "setting", "model", "CPU time", "error", "warnings")
     rows = [
         (
-            f"{e:.0e}", p.method, str(p.setting), p.model, time_of(p.cpu_s or 0.0),
-            f"{p.error:.1e}", str(len(p.warnings) or ""),
+            f"{target:.0e}", point.method, str(point.setting), point.model,
+            format_time(point.cpu_s or 0.0), f"{point.error:.1e}", str(len(point.warnings) or ""),
         )
-        for e, p in chart.advice()
+        for target, point in chart.advice()
     ]  # fmt: skip
     return head, (0, 4, 5, 6), rows
 
 
-def levels(chart: ChartRecord) -> Table:
-    """Levels of model and their own errors; no rows where there is but one."""
-    head = ("level", "its own error", "degrees of freedom", "engine")
+def level_table(chart: ChartRecord) -> Table:
+    """Model levels and their own errors; no rows if there is only one."""
+    head = ("level", "own error", "degrees of freedom", "engine")
     rows = [
         (
-            level.name, "not found" if level.error is None else f"{level.error:.1e}",
+            level.name, "unknown" if level.error is None else f"{level.error:.1e}",
             str(level.degrees_of_freedom), level.engine,
         )
         for level in chart.levels
@@ -57,8 +57,8 @@ def levels(chart: ChartRecord) -> Table:
     return head, (1, 2), rows if len(rows) > 1 else []
 
 
-def points(chart: ChartRecord) -> Table:
-    """Every run."""
+def point_table(chart: ChartRecord) -> Table:
+    """All runs."""
     head = (
         "model", "method", "setting", "error", "CPU time", "runs", "steps", "evaluations",
         "factorizations", "note",
@@ -66,46 +66,47 @@ def points(chart: ChartRecord) -> Table:
     rows = [
         (
             p.model, p.method, str(p.setting), "" if p.error is None else f"{p.error:.2e}",
-            "" if p.cpu_s is None else time_of(p.cpu_s), str(p.repeats or ""), _count(p.steps),
+            "" if p.cpu_s is None else format_time(p.cpu_s), str(p.repeats or ""), _count(p.steps),
             _count(p.evaluations), _count(p.factorizations),
-            p.failure or "; ".join(notes(p)),
+            p.failure or "; ".join(point_notes(p)),
         )
         for p in chart.points
     ]  # fmt: skip
     return head, (3, 4, 5, 6, 7, 8), rows
 
 
-def notes(point: Point) -> list[str]:
-    """What is to be said of a run beside its numbers."""
-    found = [LIMITED] if point.limited else []
-    return [*found, *(f"warns: {text}" for text in point.warnings)]
+def point_notes(point: Point) -> list[str]:
+    """Notes on a run: limited by the reference, warnings."""
+    notes = [_LIMITED] if point.limited else []
+    return [*notes, *(f"warning: {text}" for text in point.warnings)]
 
 
-def skip_reasons(entries: Iterable[Skipped], refused: bool, most: int = 1000) -> list[str]:
-    """A sentence for each reason, with at most so many of the methods that it holds for."""
+def skip_reasons(entries: Iterable[Skipped], refused: bool, max_count: int = 1000) -> list[str]:
+    """A sentence for each reason, with at most `max_count` of the methods that it applies to."""
     reasons: dict[str, dict[str, list[Skipped]]] = {}
-    for one in entries:
-        if one.refused == refused:
-            reasons.setdefault(one.reason, {}).setdefault(one.method, []).append(one)
-    return [f"{_named(methods, most)}{reason}" for reason, methods in reasons.items()]
+    for entry in entries:
+        if entry.refused == refused:
+            reasons.setdefault(entry.reason, {}).setdefault(entry.method, []).append(entry)
+    return [f"{_method_list(methods, max_count)}{reason}" for reason, methods in reasons.items()]
 
 
-def _named(methods: Mapping[str, Sequence[Skipped]], most: int) -> str:
-    """rk4, step 1 s and on; dop853 (3 levels): ..."""
+def _method_list(methods: Mapping[str, Sequence[Skipped]], max_count: int) -> str:
+    """Methods with settings or number of levels, as in "rk4, step 1 s; auto (3 levels): "."""
     texts = []
     for method, entries in methods.items():
-        models, settings = [one.model for one in entries], {one.setting for one in entries}
-        words = [method, *settings] if len(settings) == 1 else [method]
-        text = ", ".join(word for word in words if word) or ", ".join(models)
+        models = [entry.model for entry in entries]
+        settings = {entry.setting for entry in entries}
+        parts = [method, *settings] if len(settings) == 1 else [method]
+        text = ", ".join(part for part in parts if part) or ", ".join(models)
         texts.append(f"{text} ({len(models)} levels)" if method and len(models) > 1 else text)
     texts = [text for text in texts if text]
-    if len(texts) > most:
-        texts[most:] = [f"and {len(texts) - most} more"]
+    if len(texts) > max_count:
+        texts[max_count:] = [f"and {len(texts) - max_count} more"]
     return "; ".join(texts) + ": " if texts else ""
 
 
-def time_of(seconds: float) -> str:
-    """0.00123 s as 1.23 ms."""
+def format_time(seconds: float) -> str:
+    """A time in s as text with a suitable unit: 0.00123 as "1.23 ms"."""
     for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
         if seconds >= size:
             return f"{seconds / size:.3g} {unit}"

@@ -1,4 +1,4 @@
-"""Time that a chart may take, and how it is shared out."""
+"""Wall-clock time limit of a chart, and its shares for the parts of the work."""
 
 from __future__ import annotations
 
@@ -6,26 +6,26 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-#: The parts of the budget by which the reference, the settings of promising methods, and those of
-#: all are to be done; what is left is for repeating runs.
+#: Fractions of the budget after which the reference, the settings of promising methods, and those
+#: of all methods must be done; the rest is for repeated timing.
 REFERENCE, EARLY, SETTINGS, ALL = 0.35, 0.6, 0.8, 1.0
 
-#: One run may take a part of the time left, for others want to be tried too: a sixth, and less
-#: where more than thirty curves wait.
-_FEW, _WAITING = 6.0, 5.0
+#: A run may take the remaining time over the first number, or over the number of waiting curves per
+#: second number, which is less if more than thirty curves wait.
+_MIN_SHARES, _CURVES_PER_SHARE = 6.0, 5.0
 
 
 class OutOfTime(BaseException):
-    """A run has taken as long as it may.
+    """A run exceeded its time limit.
 
-    It is raised inside of `simulate`, from its report of progress, where an Exception would only
-    end the reports.
+    Raised in the progress callback of `simulate`, which catches every Exception; hence a
+    BaseException.
     """
 
 
 @dataclass
 class Budget:
-    """`seconds` of the clock from the moment it is made."""
+    """Wall-clock time limit of `seconds`, from its creation on."""
 
     seconds: float
     clock: Callable[[], float] = time.monotonic
@@ -35,32 +35,32 @@ class Budget:
 
     @property
     def spent(self) -> float:
-        """Seconds since the beginning."""
+        """Time since the creation, s."""
         return self.clock() - self._begin
 
     def left(self, part: float = ALL) -> float:
-        """Seconds until so much of the budget is spent, 0 or more."""
+        """Time until this fraction of the budget is spent, s, 0 or more."""
         return max(0.0, part * self.seconds - self.spent)
 
     def share(self, part: float, waiting: int = 1) -> float:
-        """Seconds that one run may take now, of so many curves that wait."""
-        return self.left(part) / max(_FEW, waiting / _WAITING)
+        """Time limit of the next run, s, while `waiting` curves are not finished."""
+        return self.left(part) / max(_MIN_SHARES, waiting / _CURVES_PER_SHARE)
 
     def alarm(self, seconds: float) -> Callable[[float, float], None]:
-        """What ends a run after so many seconds: to be given to `simulate` as `progress`."""
+        """Progress callback for `simulate` that raises OutOfTime after `seconds`."""
         end = self.clock() + seconds
 
-        def look(t: float, t_end: float) -> None:
+        def check_time(t: float, t_end: float) -> None:
             if self.clock() > end:
                 raise OutOfTime
 
-        return look
+        return check_time
 
     def plan(self, curves: int) -> str:
-        """What the time is for, in words."""
+        """Description of how the time is divided."""
         reference, settings = REFERENCE * self.seconds, (SETTINGS - REFERENCE) * self.seconds
         return (
             f"budget {self.seconds:g} s: up to {reference:.3g} s for the reference, then "
             f"{settings:.3g} s for the settings of {curves} curve{'s' * (curves != 1)}, the rest "
-            "to repeat runs"
+            "for repeated timing"
         )

@@ -1,4 +1,4 @@
-"""One run of a chart: what it gave, what it cost, or why it gave nothing."""
+"""Run of a chart: measured values and CPU time, or the reason why it failed."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ if TYPE_CHECKING:
     from ..model.model import Model
     from ..result.result import Result
 
-#: Runs that an event ends part by at most this part of their time.
-_APART = 0.01
+#: Largest relative difference of the end times of runs that an event ends.
+_END_TOLERANCE = 0.01
 
-#: Longest sentence of a reason.
-_LONGEST = 300
+#: Largest number of characters of a reason.
+_MAX_LENGTH = 300
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A setting that was run.
+    """Result of a run of one setting.
 
     Attributes:
-        setting: which.
-        cpu_s: processor time of the call of `simulate`, s.
-        t: (n,) samples that were reached, s.
-        q: (n, nq) coordinates there.
-        numbers: (n, k) of the measure there; None where there are none.
-        statistics: counts.
-        ended: which event ended the run, and when; "" where none did.
-        warnings: what the run itself warns of, apart from what the scene does.
-        too_coarse: its fixed step is longer than the motion needs; see `run.stability`.
-        failure: why there are no numbers.
-        refused: the scene or the machine does not allow the method.
-        late: it was ended because it took too long.
+        setting: method, model level and tolerance or step.
+        cpu_s: CPU time of the call of `simulate`, s.
+        t: (n,) times of the samples that were reached, s.
+        q: (n, nq) coordinates at these times.
+        numbers: (n, k) values of the error measure at these times; None if the run failed.
+        statistics: counts of evaluations and steps.
+        ended: event that ended the run, and when; "" if none did.
+        warnings: warnings of the run, without those of the scene.
+        too_coarse: the fixed step is too long for the motion; see `run.step_stability`.
+        failure: reason why there are no numbers.
+        refused: the scene or the machine does not support the method.
+        late: the run exceeded its time limit.
     """
 
     setting: Setting
@@ -69,13 +69,13 @@ class Trial:
 
 
 class Runs:
-    """Makes runs of models to `t_end` (s), sampled at `times` (s)."""
+    """Runs of models to `t_end` (s), sampled at `times` (s), within a time budget."""
 
     def __init__(self, t_end: float, times: Array, budget: Budget) -> None:
         self.t_end, self.times, self.budget = t_end, times, budget
 
     def steps(self, model: Model, setting: Setting, limit: float) -> Array:
-        """Times (n,) of the steps that a run takes, s, up to its end; none where it fails."""
+        """Times (n,) of the integration steps of a run, s; empty if it fails."""
         try:
             result, _ = self.simulate(model, setting, limit, own_steps=True)
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
@@ -85,51 +85,51 @@ class Runs:
     def simulate(
         self, model: Model, setting: Setting, limit: float, own_steps: bool = False
     ) -> tuple[Result, float]:
-        """The result and the processor time of the call, s; sampled at every step if asked.
+        """Simulate a model; return the result and the CPU time of the call, s.
 
-        OutOfTime after `limit` s of the clock, KeyboardInterrupt after an interrupt.
+        With `own_steps` the samples are the integration steps.  Raises OutOfTime after `limit` s of
+        wall-clock time, KeyboardInterrupt after an interrupt.
         """
         return self.called(model, setting.options, limit, own_steps)
 
     def called(
         self, model: Model, options: Mapping[str, Any], limit: float, own_steps: bool = False
     ) -> tuple[Result, float]:
-        """The same with any arguments of `simulate`."""
+        """Simulate with any keyword arguments of `simulate`; otherwise as `simulate` above."""
         times = None if own_steps else self.times
         alarm = self.budget.alarm(limit)
-        with record_interrupts() as interrupted:  # short runs end before they look at it
+        with record_interrupts() as interrupted:  # short runs do not check for it
             begin = time.process_time()
             result = model.simulate(self.t_end, output_times=times, progress=alarm, **options)
             if isinstance(result, OneWayResult) and result.is_comparable:
-                _ = result.cost  # makes the elastic response, which is part of what it is for
+                _ = result.cost  # computes the elastic response, which is part of the CPU time
             spent = time.process_time() - begin
         if interrupted or result.status is None:
             raise KeyboardInterrupt
         return result, spent
 
     def trial(self, model: Model, setting: Setting, measure: Measure, limit: float) -> Trial:
-        """One run, whatever becomes of it."""
+        """Run one setting; a failure is part of the result."""
         begin = time.process_time()
 
-        def without(why: str, refused: bool = False, late: bool = False) -> Trial:
+        def failed_trial(reason: str, refused: bool = False, late: bool = False) -> Trial:
             spent = time.process_time() - begin
-            why = _short(why)
-            return Trial(setting, spent, failure=why, refused=refused, late=late)
+            return Trial(setting, spent, failure=_truncate(reason), refused=refused, late=late)
 
         try:
             result, spent = self.simulate(model, setting, limit)
             if not result.is_comparable:
-                return without(result.message)
+                return failed_trial(result.message)
             numbers = measure.read(result)
         except OutOfTime:
-            return without(f"ended after {limit:.2g} s of the clock", late=True)
+            return failed_trial(f"stopped at its time limit of {limit:.2g} s", late=True)
         except (SceneError, EnvironmentFailure) as error:
-            return without(str(error), refused=True)
+            return failed_trial(str(error), refused=True)
         except (MstmmError, ArithmeticError, np.linalg.LinAlgError) as error:
-            return without(str(error))
+            return failed_trial(str(error))
         if not np.isfinite(numbers).all():
-            return without("not all of its numbers are finite")
-        warnings, too_coarse = _told(result)
+            return failed_trial("its results are not all finite")
+        warnings, too_coarse = _run_warnings(result)
         ended = "" if result.status is Status.FINISHED else result.message
         return Trial(
             setting, spent, result.t, result.q, numbers, result.statistics, ended, warnings,
@@ -137,45 +137,45 @@ class Runs:
         )  # fmt: skip
 
 
-def warnings_of(scene: Scene) -> tuple[str, ...]:
-    """What is warned of in every run of a scene, whatever the method."""
+def scene_warnings(scene: Scene) -> tuple[str, ...]:
+    """Warnings of a scene, which every run of it gives."""
     return sentences((*scene.risks, *short_beam_warnings(scene)))
 
 
-def _told(result: Result) -> tuple[tuple[str, ...], bool]:
-    """What a run warns of beyond what its scene does, and whether its step is too long."""
+def _run_warnings(result: Result) -> tuple[tuple[str, ...], bool]:
+    """Warnings of a run without those of its scene, and whether its fixed step is too long."""
     try:
-        found, step = result.warnings, result.certificate.step
-    except MstmmError as error:  # quantities that no sample gives
-        return (_short(str(error)),), False
-    scene = warnings_of(result.model.scene)
-    own = tuple(_short(text) for text in found if text not in scene)
-    return own, step is not None and step.risk is not None
+        warnings, step = result.warnings, result.certificate.step
+    except MstmmError as error:  # a quantity that is not available at any sample
+        return (_truncate(str(error)),), False
+    of_scene = scene_warnings(result.model.scene)
+    of_run = tuple(_truncate(text) for text in warnings if text not in of_scene)
+    return of_run, step is not None and step.risk is not None
 
 
-def factorizations(setting: Setting, statistics: Statistics | None) -> int | None:
-    """How many tangents a run factored; None where the integrator of others does not tell."""
+def factorization_count(setting: Setting, statistics: Statistics | None) -> int | None:
+    """Number of factorised tangent matrices; None for external integrators."""
     if statistics is None or setting.method in external_integrators.METHODS:
         return None
     return statistics.tangents
 
 
-def error_of(trial: Trial, reference: Trial, measure: Measure) -> float | str:
-    """Largest error over the samples that both reached, or why there is none.
+def max_error(trial: Trial, reference: Trial, measure: Measure) -> float | str:
+    """Largest error over the common samples, or the reason why there is none.
 
-    Runs that an event stops may part by a sample, or by a hundredth of their time.
+    Runs that an event ends may differ by one sample, or by `_END_TOLERANCE` of their time.
     """
     assert trial.numbers is not None and reference.numbers is not None
     n = min(len(trial.t), len(reference.t))
     if not n or (
         abs(len(trial.t) - len(reference.t)) > 1
-        and abs(trial.t[-1] - reference.t[-1]) > _APART * reference.t[-1]
+        and abs(trial.t[-1] - reference.t[-1]) > _END_TOLERANCE * reference.t[-1]
     ):
-        at = [f"{run.t[-1]:.6g} s" if len(run.t) else "the start" for run in (trial, reference)]
-        return f"it ended at {at[0]}, the reference at {at[1]}"
+        ends = [f"{run.t[-1]:.6g} s" if len(run.t) else "the start" for run in (trial, reference)]
+        return f"the run ended at {ends[0]}, the reference at {ends[1]}"
     return float(measure.apart(trial.numbers[:n], reference.numbers[:n]).max())
 
 
-def _short(text: str) -> str:
+def _truncate(text: str) -> str:
     line = (text.strip().splitlines() or ["no reason given"])[0]
-    return line if len(line) <= _LONGEST else line[: _LONGEST - 3] + "..."
+    return line if len(line) <= _MAX_LENGTH else line[: _MAX_LENGTH - 3] + "..."

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 import mstmm
 from mstmm.runtime.advice.beam_splitting import divisible, in_parts, unfit
 from mstmm.runtime.advice.measure_renaming import rename_reference
-from mstmm.runtime.chart.model_levels import at_level
+from mstmm.runtime.chart.model_levels import with_model_level
 from mstmm.scene.tables.beam import Beam
 
 
@@ -53,8 +53,8 @@ def test_the_same_body(held: str, count: int) -> None:
     found = in_parts(whole, ["beam"], count)
     assert len(found.scene.beam) == count
     for name in ("beam.root", "beam.mid", "beam.tip", "bob"):
-        one = place(at_level(whole, "rigid"), name)
-        other = place(at_level(found.scene, "rigid"), rename_reference(name, found.names))
+        one = place(with_model_level(whole, "rigid"), name)
+        other = place(with_model_level(found.scene, "rigid"), rename_reference(name, found.names))
         assert np.abs(one - other).max() < 1e-8
 
 

@@ -11,8 +11,8 @@ import pytest
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.chart_points import Level, Point, Reference, Setting
-from mstmm.runtime.chart.method_families import every_method, without_twins
-from mstmm.runtime.chart.pareto_front import bound_errors, front, recommend
+from mstmm.runtime.chart.method_families import all_methods, without_index3_duplicates
+from mstmm.runtime.chart.pareto_front import bound_errors, pareto_front, recommend
 
 REFERENCE = Reference(1e-11, "two runs", "as given", "all coordinates", "1", "none")
 
@@ -44,7 +44,7 @@ def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> Non
                 other != pair and other[0] <= pair[0] and other[1] <= pair[1] for other in numbers
             )
         }
-        found = [(p.sure_error or 0.0, p.cpu_s or 0.0) for p in front(points)]
+        found = [(p.sure_error or 0.0, p.cpu_s or 0.0) for p in pareto_front(points)]
         assert set(found) == best
         assert len(found) == len(best)
         assert found == sorted(found, key=lambda pair: pair[1])
@@ -78,11 +78,11 @@ def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.
         for asked in (1e-2, 1e-5, 1e-8):
             enough = [p for p in points if p.sure_error is not None and p.sure_error <= asked]
             if not enough:
-                with pytest.raises(NumericalFailure, match="no setting errs by at most"):
+                with pytest.raises(NumericalFailure, match="no setting reaches an error of"):
                     recommend(points, asked, REFERENCE)
                 continue
             best = recommend(points, asked, REFERENCE)
-            assert best in front(points, REFERENCE.floor)
+            assert best in pareto_front(points, REFERENCE.floor)
             assert best.sure_error is not None and best.sure_error <= asked
             assert best.cpu_s == min(p.cpu_s or 0.0 for p in enough)
             met += 1
@@ -98,9 +98,11 @@ def test_errors_that_the_reference_cannot_judge() -> None:
         REFERENCE,
     )
     assert all(point.limited for point in points)
-    assert [p.method for p in front(points, REFERENCE.floor)] == ["a"]  # b is no better, and slower
+    assert [p.method for p in pareto_front(points, REFERENCE.floor)] == [
+        "a"
+    ]  # b is no better, and slower
     assert recommend(points, 3.1e-11, REFERENCE).method == "a"
-    with pytest.raises(NumericalFailure, match="cannot judge errors below 3"):
+    with pytest.raises(NumericalFailure, match="does not resolve errors below 3"):
         recommend(points, 1e-11, REFERENCE)
     for error in (0.0, -1.0, float("nan")):
         with pytest.raises(SceneError, match="above 0"):
@@ -110,7 +112,7 @@ def test_errors_that_the_reference_cannot_judge() -> None:
 def test_what_never_changes_recommends_nothing() -> None:
     """As the origin of a body that turns about it."""
     exact = [Point(Setting("a", "m", 10.0**-i), 0.0, 1e-3, 1) for i in range(3)]
-    with pytest.raises(NumericalFailure, match="no run errs at all in all coordinates"):
+    with pytest.raises(NumericalFailure, match="all runs have zero error of all coordinates"):
         recommend(bound_errors(exact, REFERENCE), 1e-3, REFERENCE)
     some = [*exact, Point(Setting("b", "m", 1e-2), 1e-5, 1e-3, 1)]
     assert recommend(bound_errors(some, REFERENCE), 1e-3, REFERENCE).error == 0.0
@@ -123,7 +125,7 @@ def test_json_says_why_nothing_is_recommended() -> None:
     )
     data = json.loads(chart.to_json())
     assert data["recommended"] is None
-    assert "the best that ran errs by 1.0e-02" in data["not_recommended"]
+    assert "the smallest error reached is 1.0e-02" in data["not_recommended"]
     assert [(one["asked"], one["error"]) for one in data["advice"]] == [(0.1, 0.01), (0.01, 0.01)]
     assert data["front"][0]["method"] == "a"
     met = json.loads(replace(chart, wanted=0.5).to_json())
@@ -132,6 +134,6 @@ def test_json_says_why_nothing_is_recommended() -> None:
 
 
 def test_trees_are_charted_without_methods_that_do_the_same_there() -> None:
-    left = without_twins(every_method())
-    assert set(every_method()) - set(left) == {"genalpha-index3", "hht-index3"}
-    assert without_twins(("dop853", "hht-index3")) == ("dop853", "hht-index3")
+    left = without_index3_duplicates(all_methods())
+    assert set(all_methods()) - set(left) == {"genalpha-index3", "hht-index3"}
+    assert without_index3_duplicates(("dop853", "hht-index3")) == ("dop853", "hht-index3")

@@ -10,7 +10,7 @@ from chart.scenes import hub, pendulum
 
 import mstmm
 from mstmm.runtime.chart.chart import Chart
-from mstmm.runtime.chart.model_levels import ladder, limit_modes, modes_of
+from mstmm.runtime.chart.model_levels import beam_modes, limit_modes, model_levels
 
 T_END, SAMPLES = 1.2, 13
 TIMES = np.linspace(0.0, T_END, SAMPLES)
@@ -83,7 +83,7 @@ def test_what_stays_straight_is_left_out() -> None:
     flat = next(level for level in made.levels if level.name.startswith("planar"))
     assert flat.degrees_of_freedom == made.levels[-1].degrees_of_freedom - 1
     assert flat.error is not None and flat.error < 1e-7
-    assert made.reference.measure == "places of all bodies and ends"
+    assert made.reference.measure == "positions of all bodies and ends"
 
 
 def test_what_is_given_per_shape_goes_with_its_shapes() -> None:
@@ -91,7 +91,7 @@ def test_what_is_given_per_shape_goes_with_its_shapes() -> None:
         modes={"y": 2, "z": 2}, bending_stiffness=[30.0, 20.0], damping=[0.1, 0.2, 0.3, 0.4],
         initial={"eta": [1e-3, 2e-3, 3e-3, 4e-3]},
     )  # fmt: skip
-    one = limit_modes(scene, modes_of(scene), 1, stiffening=True).beam[0]
+    one = limit_modes(scene, beam_modes(scene), 1, stiffening=True).beam[0]
     assert one.modes is not None and one.modes.counts == (1, 1, 0, 0)
     assert one.damping.ratio == (0.1, 0.3)
     assert one.initial.eta == (1e-3, 3e-3)
@@ -102,12 +102,12 @@ def test_what_is_given_per_shape_goes_with_its_shapes() -> None:
 def test_numbers_of_shapes_are_counted_as_the_scene_does(frame: str) -> None:
     """About a section in its middle a beam has coordinates for both sides of each shape."""
     scene = hub(modes="auto", frame=frame, ends={"mid": 0.5})
-    whole = modes_of(scene)["blade"]
+    whole = beam_modes(scene)["blade"]
     model = mstmm.compile(scene, engine="looped")
-    richest = ladder(scene)[-1]
+    richest = model_levels(scene)[-1]
     assert richest.name == f"stiffened, {whole.y} shapes"
     assert mstmm.compile(richest.scene, engine="looped").nu == model.nu
-    smaller = mstmm.compile(ladder(scene)[-2].scene, engine="looped")
+    smaller = mstmm.compile(model_levels(scene)[-2].scene, engine="looped")
     assert smaller.nu < model.nu
 
 
@@ -127,14 +127,14 @@ def test_bodies_that_the_scene_makes_rigid_stay_rigid() -> None:
              "orientation": [0, 0, np.pi]},
         ],
     })  # fmt: skip
-    levels = ladder(two)
+    levels = model_levels(two)
     assert [one.name for one in levels][-1] == "stiffened, 2 shapes"
     assert all(one.scene.beam[1].model == "rigid" for one in levels)
 
 
 def test_shapes_of_the_users_own_are_cut_too() -> None:
     scene = hub(modes=None, shapes={"y": ["(x/L)^2", "(x/L)^3"]})
-    variants = {variant.name: variant.scene for variant in ladder(scene)}
+    variants = {variant.name: variant.scene for variant in model_levels(scene)}
     shapes = variants["linear, 1 shape"].beam[0].shapes
     assert shapes is not None and [one.text for one in shapes.y] == ["(x/L)^2"]
     assert mstmm.compile(variants["stiffened, 2 shapes"]).nu == 3
@@ -164,10 +164,10 @@ def test_quantities_that_a_level_does_not_have() -> None:
 
 
 def test_a_scene_of_rigid_bodies_has_one_level() -> None:
-    assert [variant.name for variant in ladder(pendulum())] == ["rigid"]
+    assert [variant.name for variant in model_levels(pendulum())] == ["rigid"]
     made = mstmm.chart(
         pendulum(), 0.5, methods=["dop853"], models=True, samples=3, rounds=0, budget=300
     )
     assert [level.name for level in made.levels] == ["rigid"]
     (told,) = [one for one in made.left_out if one.refused]
-    assert "no models to compare: the scene has no flexible bodies" in str(told)
+    assert "no model levels to compare: the scene has no flexible bodies" in str(told)

@@ -17,9 +17,9 @@ import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.chart_points import Point, Setting, Skipped
-from mstmm.runtime.chart.method_families import FAMILIES, every_method, family
-from mstmm.runtime.chart.plot_elements import decades, drawing, place, time_text
-from mstmm.runtime.chart.plot_styles import MARKS, mark_of, of_levels, of_methods
+from mstmm.runtime.chart.method_families import FAMILIES, all_methods, family
+from mstmm.runtime.chart.plot_elements import build_drawing, decades, plot_position, time_text
+from mstmm.runtime.chart.plot_styles import MARKS, family_mark, level_colours, method_styles
 from mstmm.runtime.chart.tables import skip_reasons
 
 METHODS = ("dop853", "dopri5", "rodas4p2", "genalpha", "rk4")
@@ -79,8 +79,8 @@ def test_the_page_stands_alone(made: Callable[[], Chart]) -> None:
     assert "script" not in {tag for tag, _ in page.seen}
     assert not re.search(r"https?:|@import|url\((?!#)", text)
     assert not [a for tag, a in page.seen if "src" in a or "href" in a]
-    shown = [w for tag, w in page.words if tag == "title" and "CPU, least of" in w]
-    inside = drawing(chart)
+    shown = [w for tag, w in page.words if tag == "title" and "CPU, smallest of" in w]
+    inside = build_drawing(chart)
     assert len(shown) == sum(len(line.points) for line in inside.lines if line.look.mark)
     for point in chart.front:
         assert any(f"{point.method}, {point.setting}" in w and point.model in w for w in shown)
@@ -94,24 +94,24 @@ def test_names_of_the_user_are_words_and_no_elements() -> None:
 
 def test_every_point_that_ran_is_drawn_once() -> None:
     for chart in (one_level(), levels()):
-        made = drawing(chart)
+        made = build_drawing(chart)
         drawn = [point for line in made.lines if line.look.mark for _, point in line.points]
-        ran = [point for point in chart.points if place(point) is not None]
+        ran = [point for point in chart.points if plot_position(point) is not None]
         assert len(drawn) + made.beyond == len(ran)
         for line in made.lines:
             for (x, y), _ in line.points:
                 assert made.x[1] <= x <= made.x[0] or x < made.x[1]
                 assert made.y[0] <= y <= made.y[1]
-        assert len(made.front) == len([p for p in chart.front if place(p) is not None])
+        assert len(made.front) == len([p for p in chart.front if plot_position(p) is not None])
 
 
 def test_wild_errors_do_not_shrink_the_rest() -> None:
     wild = Point(Setting("rk4", "as given", 0.5, fixed=True), 1e40, 1e-5, 1, sure_error=1e40)
     chart = replace(one_level(), points=(wild, *one_level().points))
-    made = drawing(chart)
+    made = build_drawing(chart)
     assert made.x[0] < 10
     assert made.beyond == 1
-    assert "beyond the picture" in chart.to_html()
+    assert "outside the plot" in chart.to_html()
 
 
 def test_a_scene_at_rest_says_so(tmp_path: Path) -> None:
@@ -127,10 +127,10 @@ def test_a_scene_at_rest_says_so(tmp_path: Path) -> None:
         made.recommended(1e-3)
     assert made.to_dict()["reference"]["still"] is True
     assert made.advice() == []
-    assert drawing(made).empty == "nothing moves in this scene"
+    assert build_drawing(made).empty == "nothing moves in this scene"
     assert not made.plot().axes[0].axison
     assert "Nothing moves in this scene" in made.to_html()
-    assert not drawing(one_level()).empty
+    assert not build_drawing(one_level()).empty
     assert len(made.save(tmp_path)) == 3
 
 
@@ -140,21 +140,24 @@ def test_long_words_below_the_title_are_not_cut() -> None:
     figure = replace(chart, reference=reference).plot()
     lines = [text.get_text() for text in figure.texts]
     first = next(i for i, line in enumerate(lines) if line.startswith("1 s of motion"))
-    assert " ".join(lines[first : first + 2]) == drawing(replace(chart, reference=reference)).below
+    assert (
+        " ".join(lines[first : first + 2])
+        == build_drawing(replace(chart, reference=reference)).below
+    )
     assert max(map(len, lines)) <= 150
 
 
 def test_points_of_levels_are_joined_by_their_methods() -> None:
-    made = drawing(levels())
+    made = build_drawing(levels())
     paths = [line for line in made.lines if not line.look.mark and not line.strong]
-    curves = {p.curve for p in levels().points if place(p) is not None}
+    curves = {p.curve for p in levels().points if plot_position(p) is not None}
     assert len(paths) == len(curves)
     assert all(line.joined for line in paths)
     assert all(len({p.curve for _, p in line.points}) == 1 for line in paths)
 
 
 def test_the_legend_of_levels_names_their_methods() -> None:
-    rows = [entry.text for entry in drawing(levels()).legend]
+    rows = [entry.text for entry in build_drawing(levels()).legend]
     assert rows[rows.index("explicit") + 1] == "dop853, dopri5"
     assert rows[rows.index("Rosenbrock") + 1] == "rodas4p2"
     assert all(f">{method}<" in levels().to_html() for method in ("rodas4p2",))
@@ -162,12 +165,12 @@ def test_the_legend_of_levels_names_their_methods() -> None:
 
 def test_labels_stand_below_the_front() -> None:
     for chart in (one_level(), levels()):
-        assert all(label.at[1] > 0 for label in drawing(chart).labels)
+        assert all(label.at[1] > 0 for label in build_drawing(chart).labels)
 
 
 def test_labels_do_not_meet() -> None:
     for chart in (one_level(), levels()):
-        made = drawing(chart)
+        made = build_drawing(chart)
         assert made.labels
         boxes = []
         for label in made.labels:
@@ -203,11 +206,11 @@ def test_files(tmp_path: Path) -> None:
 
 
 def test_methods_look_like_their_families() -> None:
-    looks = of_methods(every_method())
-    assert set(looks) == set(every_method())
+    looks = method_styles(all_methods())
+    assert set(looks) == set(all_methods())
     assert {family(name) for name in looks} == set(FAMILIES)
     assert len({(look.colour, look.mark) for look in looks.values()}) == len(looks)
-    assert len({mark_of(name) for name in looks}) == len(FAMILIES)
+    assert len({family_mark(name) for name in looks}) == len(FAMILIES)
     assert set(MARKS) >= {look.mark for look in looks.values()}
     levels = [
         "rigid",
@@ -216,7 +219,7 @@ def test_methods_look_like_their_families() -> None:
         "linear, 2 shapes",
         "stiffened, 1 shape",
     ]
-    assert len(set(of_levels(levels).values())) == len(levels)
+    assert len(set(level_colours(levels).values())) == len(levels)
 
 
 def test_words_of_times() -> None:
@@ -228,19 +231,21 @@ def test_words_of_times() -> None:
 
 def test_reasons_are_told_once() -> None:
     entries = [
-        Skipped("rk4", "rigid", "step 1 s and on", "no time", False),
-        Skipped("rk4", "linear", "step 1 s and on", "no time", False),
-        Skipped("dop853", "linear", "rtol 1e-05 and on", "no time", False),
-        Skipped("auto", "rigid", "rtol 1e-04 and on", "no time", False),
-        Skipped("auto", "linear", "rtol 1e-05 and on", "no time", False),
+        Skipped("rk4", "rigid", "step 1 s and tighter", "no time", False),
+        Skipped("rk4", "linear", "step 1 s and tighter", "no time", False),
+        Skipped("dop853", "linear", "rtol 1e-05 and tighter", "no time", False),
+        Skipped("auto", "rigid", "rtol 1e-04 and tighter", "no time", False),
+        Skipped("auto", "linear", "rtol 1e-05 and tighter", "no time", False),
         Skipped("", "one-way", "", "no such level", True),
         Skipped("", "", "", "no rounds", False),
     ]
     assert skip_reasons(entries, False) == [
-        "rk4, step 1 s and on (2 levels); dop853, rtol 1e-05 and on; auto (2 levels): no time",
+        "rk4, step 1 s and tighter (2 levels); dop853, rtol 1e-05 and tighter; auto (2 levels): "
+        "no time",
         "no rounds",
     ]  # fmt: skip
     assert (
-        skip_reasons(entries, False, 1)[0] == "rk4, step 1 s and on (2 levels); and 2 more: no time"
+        skip_reasons(entries, False, 1)[0]
+        == "rk4, step 1 s and tighter (2 levels); and 2 more: no time"
     )
     assert skip_reasons(entries, True) == ["one-way: no such level"]

@@ -10,7 +10,7 @@ import pytest
 import mstmm
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.model_levels import Variant
-from mstmm.runtime.chart.planar_model import planar
+from mstmm.runtime.chart.planar_model import planar_level
 
 BODY = {"name": "one", "mass": 1.0, "center_of_mass": [0.5, 0.1, 0], "inertia": [0.1, 0.2, 0.3],
         "ends": {"tip": [1, 0, 0]}}  # fmt: skip
@@ -45,7 +45,7 @@ def run(scene: mstmm.Scene) -> mstmm.Result:
 
 def level(scene: mstmm.Scene) -> Variant | None:
     result = run(scene)
-    return planar(Variant("rigid", scene), result.model, result.q)
+    return planar_level(Variant("rigid", scene), result.model, result.q)
 
 
 @pytest.mark.parametrize("axis", ["z", "x"])

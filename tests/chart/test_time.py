@@ -12,7 +12,7 @@ from chart.scenes import Clock, hub, pendulum, stiff
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.chart.build_chart import make_chart, request
+from mstmm.runtime.chart.build_chart import chart_request, make_chart
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.chart_points import Setting
 from mstmm.runtime.chart.time_budget import EARLY, REFERENCE, SETTINGS, Budget
@@ -33,7 +33,7 @@ def chart(seconds: float, each_run: float, said: list[str], rounds: int = 0) -> 
         clock.now += each_run
 
     model = mstmm.compile(pendulum(), engine="looped")
-    asked = request(1.0, (), METHODS, False, 1e-3, seconds, 11, rounds)
+    asked = chart_request(1.0, (), METHODS, False, 1e-3, seconds, 11, rounds)
     budget = Budget(seconds, clock)
     return make_chart(model, asked, mstmm.compile, "", tell, said.append, budget)
 
@@ -55,9 +55,9 @@ def test_what_time_leaves_out_is_told() -> None:
     whole, part, same = (chart(100.0, each_run, []) for each_run in (0.0, 2.0, 2.0))
     assert not whole.left_out
     assert 0 < len(part.points) < len(whole.points)
-    late = [one for one in part.left_out if "its part of the time left" in one.reason]
+    late = [one for one in part.left_out if "too little time left" in one.reason]
     assert {one.method for one in late} == set(METHODS)
-    assert all(one.setting.endswith("and on") for one in late)
+    assert all(one.setting.endswith("and tighter") for one in late)
     ran = {(p.method, p.setting.value) for p in part.points}
     assert ran < {(p.method, p.setting.value) for p in whole.points}
     assert [p.setting for p in same.points] == [p.setting for p in part.points]
@@ -89,7 +89,7 @@ def test_a_run_that_takes_too_long_ends() -> None:
     trial = runs.trial(model, setting, Coordinates(model), limit=0.5)
     assert trial.late
     assert trial.numbers is None
-    assert "ended after 0.5 s" in trial.failure
+    assert "stopped at its time limit of 0.5 s" in trial.failure
 
 
 def test_an_interrupted_run_is_no_point(monkeypatch: pytest.MonkeyPatch) -> None:

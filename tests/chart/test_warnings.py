@@ -14,8 +14,8 @@ import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.chart.chart import Chart
 from mstmm.runtime.chart.chart_points import Point, Setting
-from mstmm.runtime.chart.pareto_front import bound_errors, front, recommend, split_warnings
-from mstmm.runtime.chart.tables import points, recommendation
+from mstmm.runtime.chart.pareto_front import bound_errors, pareto_front, recommend, split_warnings
+from mstmm.runtime.chart.tables import point_table, recommendation
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -52,11 +52,11 @@ def test_warnings_stand_beside_their_points() -> None:
     chart = damped()
     warned = next(p for p in chart.points if p.warnings and p.error)
     assert (
-        f"warns: {warned.warnings[0]}"
-        in [row[-1] for row in points(chart)[2]][chart.points.index(warned)]
+        f"warning: {warned.warnings[0]}"
+        in [row[-1] for row in point_table(chart)[2]][chart.points.index(warned)]
     )
     page = chart.to_html()
-    assert page.count("warns: ") > len([p for p in chart.points if p.warnings])  # pointer and table
+    assert page.count("warning: ") > len([p for p in chart.points if p.warnings])  # pointer and table
 
 
 def test_a_step_that_is_too_long_is_never_recommended() -> None:
@@ -64,9 +64,9 @@ def test_a_step_that_is_too_long_is_never_recommended() -> None:
     lucky = Point(Setting("rk4", "m", 0.1, True), 1e-6, 1e-4, 1, too_coarse=True)
     slow = Point(Setting("dop853", "m", 1e-6), 1e-6, 1e-3, 1)
     found = bound_errors([lucky, slow], REFERENCE)
-    assert [p.method for p in front(found)] == ["dop853"]
+    assert [p.method for p in pareto_front(found)] == ["dop853"]
     assert recommend(found, 1e-3, REFERENCE).method == "dop853"
-    with pytest.raises(NumericalFailure, match="longer than the fastest motion allows"):
+    with pytest.raises(NumericalFailure, match="fixed step too long for the fastest motion"):
         recommend(found[:1], 1e-3, REFERENCE)
 
 
@@ -76,8 +76,8 @@ def test_what_is_recommended_is_told_with_its_warnings() -> None:
     other = replace(best, warnings=("beware",))
     shown = [other if p is best else p for p in chart.points]
     changed = replace(chart, points=tuple(shown))
-    assert recommendation(changed).endswith("; it warns: beware")
-    assert "it warns: beware" in changed.to_html()
+    assert recommendation(changed).endswith("; warning: beware")
+    assert "warning: beware" in changed.to_html()
 
 
 def test_what_the_scene_warns_of_is_told_once() -> None:
@@ -119,15 +119,15 @@ def test_a_run_that_an_event_ends_is_told() -> None:
         stop, 3.0, methods=["dop853", "rk4"], rounds=0, budget=300, state=said.append
     )
     assert 'stopped by event "low" at t = 0.328' in made.reference.ended
-    assert any("do not reach 3 s" in text for text in said)
-    assert "The runs do not reach 3 s: stopped by event" in made.to_html()
+    assert any("runs end before 3 s" in text for text in said)
+    assert "Runs end before 3 s: stopped by event" in made.to_html()
     assert made.to_dict()["reference"]["ended"] == made.reference.ended
-    assert made.looked.startswith("101 even times up to 0.328")
+    assert made.looked.startswith("101 equidistant times up to 0.328")
     assert all(p.error is not None for p in made.points if p.method == "dop853")
 
 
 def test_arguments_that_say_nothing() -> None:
-    with pytest.raises(SceneError, match=r"methods = \[\]: expected one name or more"):
+    with pytest.raises(SceneError, match=r"methods = \[\]: expected one or more names"):
         mstmm.chart(pendulum(), 1.0, methods=[])
     for error in ("a", True, float("inf"), [1e-3]):
         with pytest.raises(SceneError, match=r"error = .*: expected a number above 0"):

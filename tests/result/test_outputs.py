@@ -17,7 +17,7 @@ from mstmm.errors import SceneError
 from mstmm.pipeline.compilation import compile_level
 from mstmm.runtime.advice.beam_splitting import in_parts
 from mstmm.runtime.advice.reduced_outputs import with_outputs_there
-from mstmm.runtime.chart.model_levels import at_level
+from mstmm.runtime.chart.model_levels import with_model_level
 from mstmm.runtime.engine.observation_columns import SUMS
 from mstmm.runtime.result.result import Result
 from mstmm.scene.checks.inputs import SCENE_QUANTITIES
@@ -188,7 +188,7 @@ def test_outputs_follow_a_beam_into_its_parts() -> None:
 
 
 def test_a_reduced_scene_keeps_the_outputs_that_it_has() -> None:
-    reduced = with_outputs_there(at_level(blade(BENT, TIP), "rigid"), compile_level)
+    reduced = with_outputs_there(with_model_level(blade(BENT, TIP), "rigid"), compile_level)
     assert [output.name for output in reduced.output] == ["tip"]
     assert list(mstmm.compile(reduced).simulate(0.1).outputs()) == ["tip"]
 

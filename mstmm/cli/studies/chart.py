@@ -136,13 +136,21 @@ def progress_callback(shown: ProgressBar, budget: float) -> Callable[[str], None
 
 
 def _print_chart(made: Chart, files: list[str]) -> None:
-    from mstmm.runtime.chart.tables import advice, levels, recommendation, skip_reasons
+    from mstmm.runtime.chart.tables import (
+        level_table,
+        recommendation,
+        recommendation_table,
+        skip_reasons,
+    )
 
     from .. import terminal_output
 
     console = terminal_output.table_console()
     terminal_output.print_lines(recommendation(made))
-    for title, (head, numbers, rows) in (("", advice(made)), ("model levels", levels(made))):
+    for title, (head, numbers, rows) in (
+        ("", recommendation_table(made)),
+        ("model levels", level_table(made)),
+    ):
         if rows:
             columns = [name + ">" * (i in numbers) for i, name in enumerate(head)]
             console.print(terminal_output.build_table(title, columns, rows))
