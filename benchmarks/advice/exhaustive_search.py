@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import mstmm
-from mstmm.runtime.advice.beam_splitting import divisible, in_parts
+from mstmm.runtime.advice.beam_splitting import make_splittable, split_beams
 from mstmm.runtime.advice.body_model_levels import (
     LINEAR,
     ONE_WAY,
@@ -107,7 +107,7 @@ def truth(scene: mstmm.Scene, t_end: float) -> Truth | None:
 
 def truth_in_parts(known: Truth, wholes: set[str], t_end: float) -> Truth | None:
     """The same with beams that one frame cannot follow in sixteen welded parts each."""
-    parts = in_parts(_divisible(known.base, wholes), wholes, _PARTS)
+    parts = split_beams(_divisible(known.base, wholes), wholes, _PARTS)
     model = mstmm.compile(parts.scene, engine="looped")
     known.measure.know(model, parts.names)
     found = _agreed(model, known.measure, t_end)
@@ -118,7 +118,7 @@ def _divisible(scene: mstmm.Scene, wholes: set[str]) -> mstmm.Scene:
     """The scene whose beams have nothing that belongs to shapes of the whole."""
     bodies = mstmm.compile(scene, engine="looped").flexible
     beams = (
-        divisible(beam, float(modal_frequencies(bodies[beam.name])[0]))[0]
+        make_splittable(beam, float(modal_frequencies(bodies[beam.name])[0]))[0]
         if beam.name in wholes
         else beam
         for beam in scene.beam

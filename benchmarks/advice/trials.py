@@ -119,7 +119,7 @@ def outcome(
             if run is not None:
                 theirs[one].append(run[1])
     times = [None if one is None else min(theirs[one]) for one in rivals]
-    changes = [text.partition(";")[0].partition(" with frames")[0] for text in advice.changes]
+    changes = [text.partition(";")[0].partition(" with a frame")[0] for text in advice.changes]
     advised = "; ".join([*(f"{b.name}: {b.choice}" for b in advice.bodies), *changes])
     return Outcome(
         name, asked, error, advice.error, min(ours), None if rivals[0] is None else str(rivals[0]),

@@ -53,9 +53,9 @@ def advise(
     or whose motion cannot be determined to within the target error.
     """
     from ..runtime.advice.advise import make_advice
-    from ..runtime.advice.request import request
+    from ..runtime.advice.request import advice_request
 
-    request_options = request(t_end, error, of, budget, samples, rounds)
+    request_options = advice_request(t_end, error, of, budget, samples, rounds)
 
     def compile_scene_level(one: Scene) -> Model:
         return compile_level(one, engine=engine)

@@ -1,1 +1,1 @@
-"""The smallest sufficient model of a scene for a wanted error: estimated, tried, written down."""
+"""Smallest sufficient model of a scene for a target error, with method and tolerance."""

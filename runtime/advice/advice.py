@@ -1,4 +1,4 @@
-"""What an advice says: the choice for each body, method and tolerance, errors, savings, reasons."""
+"""Result of `mstmm.advise`: reduced scene, method and tolerance, errors, savings, reasons."""
 
 from __future__ import annotations
 
@@ -19,24 +19,25 @@ from .body_model_levels import BodyModel
 from .error_predictors import ErrorPrediction
 from .measure_renaming import rename_reference
 
-#: Columns of comments in a scene that is written.
+#: Columns of the comments in a scene file.
 _WIDTH = 96
 
 
 @dataclass(frozen=True)
 class BodyAdvice:
-    """What one flexible body may be.
+    """Advised model of one flexible body.
 
     Attributes:
-        name: of the body.
-        given: what it is in the scene.
-        choice: the least that suffices.
-        error: of this choice alone, all other bodies at their richest; None where it was not found.
-        saving: processor time of the richest model over that with this choice alone.
-        reason: in words, with figures.
-        evidence: what a one-way run tells of it; None where there is none.
-        split: how far one floating frame may err where that is more than is asked (or was feared to
-            be) and the beam stays whole; None elsewhere.
+        name: name of the body.
+        given: model of the body in the given scene.
+        choice: smallest sufficient model.
+        error: error of this choice alone, with the richest models of all other bodies; None if
+            unknown.
+        saving: CPU time of the richest model over that with this choice alone.
+        reason: reason of the choice, with numbers.
+        evidence: error estimates from a run with one-way coupling; None if there are none.
+        split: error of one floating frame, where its estimate exceeds the target error and the beam
+            is not split; else None.
     """
 
     name: str
@@ -51,7 +52,8 @@ class BodyAdvice:
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
         return {
-            "name": self.name, "given": _plain(self.given), "advised": _plain(self.choice),
+            "name": self.name, "given": _plain_model(self.given),
+            "advised": _plain_model(self.choice),
             "error": self.error, "saving": self.saving, "reason": self.reason,
             "evidence": None if self.evidence is None else self.evidence.to_dict(),
             "split": self.split,
@@ -60,8 +62,14 @@ class BodyAdvice:
 
 @dataclass(frozen=True)
 class TriedModel:
-    """A model that was tried: its error against the richest one (None where it gave none), its
-    processor time in s at the tolerance of comparisons, and why there is no error."""
+    """Model that was tried.
+
+    Attributes:
+        name: description of the model.
+        error: error relative to the richest model; None if the run failed.
+        cpu_s: CPU time at the tolerance of the comparison, s.
+        why: reason why there is no error, else "".
+    """
 
     name: str
     error: float | None
@@ -71,26 +79,29 @@ class TriedModel:
 
 @dataclass(frozen=True)
 class Advice:
-    """The smallest model that was found to suffice.  Made by `mstmm.advise`.
+    """Smallest sufficient model found for a target error.  Made by `mstmm.advise`.
 
     Attributes:
-        asked: the error asked for, of `measure`, in `unit` ("1" for parts, see `scaling`).
-        t_end: s, end of the run that the advice is for.
-        compared: over what models were compared, in words; `whole` where that was all of the run.
-        reference_error: how far two runs of the richest model were apart.
-        bodies: the choice for each flexible body.
-        changes: what became of hinges, springs and welded bodies, a sentence each.
-        setting: method and tolerance.
-        error: of the advised model at this setting, against the richest model.
-        cpu_s: processor time of that run over what was compared, s.
-        model_saving: time of the scene as it was given over that of the advised one, the same
-            method and tolerance; setting_saving: time of the default method and tolerance over the
-            advised ones, on the advised model.  None where one of the runs failed or took too long.
-        scene: the reduced scene.
-        names: places that have other names in it, such as "arm.tip", and these names.
-        parts: beams of it that are parts of a beam of the given scene, and which.
-        notes: what else there is to know, a sentence each.
-        tried: every model that was tried.
+        asked: target error of `measure`, in `unit` ("1": relative, see `scaling`).
+        measure, unit, scaling: compared quantity, its unit, and what it is divided by.
+        t_end: end of the run that the advice is for, s.
+        compared: description of the time span of the comparison.
+        whole: whether this is the whole run.
+        reference_error: difference of two runs of the richest model.
+        bodies: advice for each flexible body.
+        changes: changes of hinges, springs, beams and welded bodies, a sentence each.
+        setting: method and tolerance or step.
+        error: error of the advised model with this setting, relative to the richest model.
+        cpu_s: CPU time of that run over the compared time span, s.
+        model_saving: CPU time of the given scene over that of the reduced one, with the same method
+            and tolerance; None if one of the runs failed or took too long.
+        setting_saving: CPU time with the default method and tolerance over that with the advised
+            ones, on the reduced scene; None as above.
+        scene: reduced scene.
+        names: former name of a body or end, such as "arm.tip" -> its name in the reduced scene.
+        parts: beam of the reduced scene -> beam of the given scene that it is a part of.
+        notes: limits of the advice, a sentence each.
+        tried: all models that were tried.
     """
 
     asked: float
@@ -121,25 +132,25 @@ class Advice:
 
     @property
     def options(self) -> dict[str, Any]:
-        """Arguments of `simulate`: method, and rtol and atol or step."""
+        """Keyword arguments of `simulate`: method, and rtol and atol or step."""
         return self.setting.options
 
     @property
     def in_words(self) -> str:
-        """What errors without a unit are parts of, in brackets; "" for others."""
+        """Scaling of relative errors, in brackets; "" for errors with a unit."""
         return f" ({self.scaling})" if self.unit == "1" and self.scaling else ""
 
     @property
     def reduced(self) -> bool:
-        """Whether the advised scene is less than the given one."""
-        return bool(self.changes) or any(one.choice != one.given for one in self.bodies)
+        """Whether the advised scene differs from the given one."""
+        return bool(self.changes) or any(body.choice != body.given for body in self.bodies)
 
     def renamed(self, quantity: str) -> str:
-        """The name of a place or a quantity in the reduced scene."""
+        """Name of a body, end or quantity in the reduced scene."""
         return rename_reference(quantity, self.names)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as plain values."""
+        """All data as plain values."""
         return {
             "error_asked": self.asked, "of": self.measure, "unit": self.unit,
             "scaling": self.scaling, "t_end": self.t_end, "compared": self.compared,
@@ -150,36 +161,39 @@ class Advice:
             "setting_saving": self.setting_saving, "reduced": self.reduced,
             "scene": self.scene.to_toml(), "names": dict(self.names), "parts": dict(self.parts),
             "notes": list(self.notes),
-            "tried": [asdict(one) for one in self.tried],
+            "tried": [asdict(tried) for tried in self.tried],
         }  # fmt: skip
 
     def to_json(self) -> str:
-        """The same as text."""
+        """All data as JSON text."""
         return json.dumps(self.to_dict(), indent=2, allow_nan=False)
 
     def to_toml(self) -> str:
-        """The reduced scene, with what was decided in comments."""
+        """Reduced scene as TOML, with the decisions as comments."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         options = " ".join(f"--{key} {value:g}" for key, value in self.setting.numbers.items())
         lines = [
-            f"Reduced for an error of {self.asked:g}{unit} of {self.measure}{self.in_words}; it "
-            f"errs by {self.error:.1e} over {self.compared}.",
-            f"Run it by: mstmm simulate FILE --t-end {self.t_end:g} --method {self.method} "
+            f"Reduced for an error of {self.asked:g}{unit} of {self.measure}{self.in_words}; its "
+            f"error is {self.error:.1e} over {self.compared}.",
+            f"Command: mstmm simulate FILE --t-end {self.t_end:g} --method {self.method} "
             f"{options}",
-            *(f"{one.name}: {one.choice} (was {one.given}). {one.reason}" for one in self.bodies),
+            *(
+                f"{body.name}: {body.choice} (was {body.given}). {body.reason}"
+                for body in self.bodies
+            ),
             *self.changes, *self.notes,
         ]  # fmt: skip
-        head = [part for line in lines for part in textwrap.wrap(line, _WIDTH)]
-        return "\n".join(f"# {line}" for line in head) + "\n\n" + self.scene.to_toml()
+        comment = [part for line in lines for part in textwrap.wrap(line, _WIDTH)]
+        return "\n".join(f"# {line}" for line in comment) + "\n\n" + self.scene.to_toml()
 
     def write(self, path: str | Path) -> Path:
-        """Write the reduced scene.  SceneError for a name that does not end in .toml."""
-        place = require_path("scene", path)
-        if place.suffix != ".toml":
-            raise SceneError(f"{place}: expected a name that ends in .toml")
-        write_text(place, self.to_toml())
-        return place
+        """Write the reduced scene to a .toml file; SceneError for another file name extension."""
+        file = require_path("scene", path)
+        if file.suffix != ".toml":
+            raise SceneError(f"{file}: expected a name that ends in .toml")
+        write_text(file, self.to_toml())
+        return file
 
 
-def _plain(choice: BodyModel) -> dict[str, Any]:
-    return {"level": choice.level, "shapes": dict(choice.shapes) if choice.level != "rigid" else {}}
+def _plain_model(model: BodyModel) -> dict[str, Any]:
+    return {"level": model.level, "shapes": dict(model.shapes) if model.level != "rigid" else {}}

@@ -1,4 +1,4 @@
-"""What is known while an advice is made: the question, the bench, and what was told so far."""
+"""State of the search for the smallest model: request, runner of trials, results so far."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..integrate.steppers import AUTO
 from ..result.flexible.risks import MAX_SLOPE
 from .error_predictors import ErrorPrediction, predict_errors
 from .request import Request
-from .trial_models import first_rtol
+from .trial_models import initial_rtol
 
 if TYPE_CHECKING:
     from mstmm.scene import Scene
@@ -29,46 +29,52 @@ if TYPE_CHECKING:
     from ..result.result import Result
     from .body_model_levels import Bodies, BodyModel
     from .measure_renaming import Renaming
-    from .trial_models import Compile, Tell, TrialRunner
+    from .trial_models import Compile, Report, TrialRunner
 
-#: A model may err by this part of what is asked; the rest is for the integration, and for what lies
-#: between the samples.
-_ENOUGH = 0.9
+#: Largest error of a model as a fraction of the target error; the rest is for the integration, and
+#: for times between the samples.
+_MODEL_ERROR = 0.9
 
-#: A one-way run may take this part of the budget.
-_FIRST = 0.3
+#: Fraction of the budget for a run with one-way coupling.
+_ONE_WAY_BUDGET = 0.3
 
-#: Models are judged beside the error of the reference's own parts where that leaves this part of
-#: what is asked.
-_LEFT = 0.3
+#: The error of a split reference is subtracted from the target error if at least this fraction of
+#: the target error remains.
+_MIN_REMAINDER = 0.3
 
-#: Name of the richest model, with which others are compared.
+#: Name of the richest model, which all others are compared with.
 RICHEST = "the richest model"
 
 
 @dataclass
 class AdviceState:
-    """The state of one advice.
+    """State of the search for one advice.
 
     Attributes:
-        scene, asked, budget, compile, tell: what it is about.
-        measure, length, size: of errors; of the scene, m; of the motion, in the unit of errors.
-        bench: where models are run.
-        whole: body -> what it is at its richest, as the scene has it.
-        bodies: the flexible bodies of the scene that is reduced.
-        notes: what else there is to know.
-        told: name of a model -> what became of its hinges and beams.
-        parts: beam that is a part -> the beam of the scene.
-        unseen: error of the reference's own parts.
-        split_error: seen of one frame where beams stay whole; None where nothing was seen.
-        skipped: models and changes that the budget left no time for.
+        scene: given scene.
+        asked: validated arguments.
+        budget: time limit.
+        compile: function that compiles a scene.
+        tell: callback with a sentence before every run.
+        measure: error measure.
+        length: length of the scene, m.
+        size: size of the motion, in the unit of errors.
+        bench: runner of trial models.
+        whole: body -> its richest model in the scene, without splitting.
+        bodies: flexible bodies of the scene that is reduced.
+        notes: limits of the advice, a sentence each.
+        told: name of a model -> sentences on the changes of its hinges and beams.
+        parts: part of a split beam -> beam of the given scene.
+        unseen: estimated error of the reference itself, by the number of its parts.
+        split_error: measured error of one frame where beams are not split; None if not measured.
+        skipped: models and changes that were skipped for lack of time.
     """
 
     scene: Scene
     asked: Request
     budget: Budget
     compile: Compile
-    tell: Tell
+    tell: Report
     measure: Renaming = field(init=False)
     length: float = 1.0
     size: float = 1.0
@@ -83,71 +89,78 @@ class AdviceState:
     skipped: list[str] = field(default_factory=list)
 
     def least(self, scene: Scene) -> Result | None:
-        """The run in which all bodies respond one way, or none deform; None where there is none."""
-        self.tell("one-way, before anything else")
+        """Run with one-way coupling of all flexible bodies; None if it fails."""
+        self.tell("one-way coupling, for error estimates")
         times = np.linspace(0.0, self.asked.t_end, self.asked.samples)
         runs = Runs(self.asked.t_end, times, self.budget)
-        setting = Setting(AUTO, "one-way", first_rtol(self.asked.error))
+        setting = Setting(AUTO, "one-way", initial_rtol(self.asked.error))
         try:
             model = self.compile(with_model_level(scene, "one-way"))
-            return runs.simulate(model, setting, _FIRST * self.budget.left())[0]
+            return runs.simulate(model, setting, _ONE_WAY_BUDGET * self.budget.left())[0]
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
 
-    def known(self, first: Result | None, richest: Model) -> tuple[dict[str, ErrorPrediction], str]:
-        """The evidence of a one-way run, of one of the richest model where there is none, and why
-        there is none at all."""
-        evidence, why = predict_errors(first, self.length)
+    def known(
+        self, one_way: Result | None, richest: Model
+    ) -> tuple[dict[str, ErrorPrediction], str]:
+        """Error estimates by body from a run with one-way coupling, and why there are none, or "".
+
+        Without such a run, they come from a run of the richest model.
+        """
+        evidence, reason = predict_errors(one_way, self.length)
         if evidence or not richest.flexible:
-            return evidence, why
+            return evidence, reason
         setting = Setting(AUTO, RICHEST, self.bench.rtol)
-        limit = _FIRST * self.budget.left()
+        limit = _ONE_WAY_BUDGET * self.budget.left()
         try:
             result, _ = self.bench.runs.simulate(richest, setting, limit)
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError) as problem:
-            return {}, why or str(problem)
+            return {}, reason or str(problem)
         return predict_errors(result, self.length)
 
     @property
     def in_measure(self) -> float:
-        """What turns a displacement in m into the unit of errors."""
+        """Factor from a displacement in m to the unit of errors."""
         if isinstance(self.measure.inner, Places):
             return 1.0 / self.length
         return 1.0 if self.measure.unit == "m" else self.size / self.length
 
     @property
     def enough(self) -> float:
-        """The error against the reference that suffices for a model."""
-        return _ENOUGH * self.beside_unseen
+        """Largest sufficient error of a model relative to the reference."""
+        return _MODEL_ERROR * self.beside_unseen
 
     @property
     def beside_unseen(self) -> float:
-        """What is left of the error asked beside the reference's own, where that leaves any."""
-        rest = self.asked.error - self.unseen
-        return rest if rest > _LEFT * self.asked.error else self.asked.error
+        """Target error less the error of the reference, if enough of it remains."""
+        remainder = self.asked.error - self.unseen
+        return remainder if remainder > _MIN_REMAINDER * self.asked.error else self.asked.error
 
     @property
     def part(self) -> float:
-        """The error asked in parts of the motion."""
+        """Target error relative to the size of the motion."""
         return (
             self.asked.error
             if self.measure.unit in ("1", "rad")
             else (self.asked.error / self.size)
         )
 
-    def steep(self, known: ErrorPrediction | None) -> bool:
-        """Whether one floating frame may be too little for a body."""
-        if known is None:
+    def steep(self, prediction: ErrorPrediction | None) -> bool:
+        """Whether one floating frame may not suffice for a body."""
+        if prediction is None:
             return False
-        return known.frame_error * self.in_measure > self.asked.error or known.slope > MAX_SLOPE
+        return (
+            prediction.frame_error * self.in_measure > self.asked.error
+            or prediction.slope > MAX_SLOPE
+        )
 
 
-def size_of(measure: Measure, result: Result | None) -> float:
-    """How far what is compared goes in a run; 1 where that is not known."""
+def motion_size(measure: Measure, result: Result | None) -> float:
+    """Largest distance from the start in a run, by the error measure; 1 if unknown."""
     if result is None or not result.is_comparable:
         return 1.0
     numbers = measure.read(result)
     measure.scale_by(numbers)
     start = np.broadcast_to(numbers[:1], numbers.shape)
-    far = float(measure.apart(numbers, start).max(initial=0.0))
-    return far if np.isfinite(far) and far > 0 else 1.0
+    distance = float(measure.apart(numbers, start).max(initial=0.0))
+    return distance if np.isfinite(distance) and distance > 0 else 1.0

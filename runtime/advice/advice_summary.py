@@ -1,4 +1,4 @@
-"""What an advice says of what was found: every choice alone, with its reason; what was saved."""
+"""Build the advice from the results of the search: each choice with its reason, and savings."""
 
 from __future__ import annotations
 
@@ -15,185 +15,195 @@ from ..chart.trial_run import max_error
 from ..integrate.steppers import AUTO
 from .advice import Advice, BodyAdvice, TriedModel
 from .advice_state import AdviceState
-from .body_model_levels import RIGID, BodyModel, given_choice
+from .body_model_levels import RIGID, BodyModel, given_body_model
 from .error_predictors import ErrorPrediction
 from .full_run_settings import whole_run_tolerance
 from .method_selection import SelectedSetting, compare_cpu_times
-from .reason_text import reason
-from .reduced_outputs import with_outputs_there
+from .reason_text import choice_reason
+from .reduced_outputs import with_available_outputs
 from .search import Choices, ModelSearch
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
     from mstmm.scene.tables.elastic import Elastic
 
-#: Name of the scene as it was given, among the models tried.
+#: Name of the given scene among the models tried.
 AS_GIVEN = "as given"
 
 
 def build_advice(
-    work: AdviceState,
+    state: AdviceState,
     choices: Mapping[str, BodyModel],
     evidence: Mapping[str, ErrorPrediction],
-    chosen: SelectedSetting,
+    selected: SelectedSetting,
     search: ModelSearch,
     base: str,
 ) -> Advice:
-    """The advice.  `base` is the model that has what was changed before bodies were looked at."""
-    asked, bench = work.asked, work.bench
-    model_saving, setting_saving = _savings(work, chosen)
-    instead = _scene_as_given(work, chosen, model_saving)
-    if instead is not None:
-        chosen, bodies, work.parts = instead, _bodies_as_given(work, evidence), {}
-        model_saving, setting_saving = _savings(work, chosen)
+    """Build the advice; `base` is the name of the model before the search over bodies."""
+    request, bench = state.asked, state.bench
+    model_saving, setting_saving = _savings(state, selected)
+    given = _given_scene_if_better(state, selected, model_saving)
+    if given is not None:
+        selected, bodies, state.parts = given, _bodies_as_given(state, evidence), {}
+        model_saving, setting_saving = _savings(state, selected)
     else:
         bodies = tuple(
-            _body(work, name, choice, evidence.get(name), search)
-            for name, choice in {**_straightened(work), **choices}.items()
+            _body_advice(state, name, choice, evidence.get(name), search)
+            for name, choice in {**_undeformed_bodies(state), **choices}.items()
         )
-    changes = work.told.get(chosen.tried.name, work.told[base])
+    changes = state.told.get(selected.tried.name, state.told[base])
     if not bodies:
-        work.notes.append("there is nothing to reduce in the bodies: none of them deforms")
-    missing = [*work.skipped, *(f"model {name}" for name in bench.late)]
+        state.notes.append("there is nothing to reduce in the bodies: none of them is flexible")
+    missing = [*state.skipped, *(f"model {name}" for name in bench.late)]
     if missing:
-        work.notes.append(
-            f"the budget of {asked.budget:g} s limits this advice; not examined: "
-            f"{abbreviate_names(missing)}; with more --budget another model may be advised"
+        state.notes.append(
+            f"the budget of {request.budget:g} s limits this advice; not examined: "
+            f"{abbreviate_names(missing)}; a larger --budget may lead to another model"
         )
     growth = bench.span.growth
-    error = chosen.point.error
-    assert error is not None and chosen.point.cpu_s is not None
+    error = selected.point.error
+    assert error is not None and selected.point.cpu_s is not None
     return Advice(
-        asked.error, work.measure.name, work.measure.unit, work.measure.scaling, asked.t_end,
-        _compared(work, chosen), bench.span.whole, max(bench.floor, work.unseen), bodies, changes,
-        chosen.point.setting, error * growth + work.unseen, chosen.point.cpu_s, model_saving,
-        setting_saving, with_outputs_there(chosen.tried.scene, work.compile),
-        dict(work.measure.names_in(chosen.tried.running)), dict(work.parts),
-        tuple(work.notes),
+        request.error, state.measure.name, state.measure.unit, state.measure.scaling, request.t_end,
+        _comparison_text(state, selected), bench.span.whole, max(bench.floor, state.unseen), bodies,
+        changes, selected.point.setting, error * growth + state.unseen, selected.point.cpu_s,
+        model_saving, setting_saving,
+        with_available_outputs(selected.tried.scene, state.compile),
+        dict(state.measure.names_in(selected.tried.running)), dict(state.parts),
+        tuple(state.notes),
         tuple(
             TriedModel(
-                one.name, one.error if math.isfinite(one.error) else None, one.cpu_s, one.why
+                tried.name, tried.error if math.isfinite(tried.error) else None, tried.cpu_s,
+                tried.why,
             )
-            for one in bench.all
-            if math.isfinite(one.cpu_s)
+            for tried in bench.all
+            if math.isfinite(tried.cpu_s)
         ),
     )  # fmt: skip
 
 
-def _scene_as_given(
-    work: AdviceState, chosen: SelectedSetting, saving: float | None
+def _given_scene_if_better(
+    state: AdviceState, selected: SelectedSetting, saving: float | None
 ) -> SelectedSetting | None:
-    """The scene as given, where the model found takes longer, errs more, and this one suffices."""
-    bench, setting = work.bench, chosen.point.setting
-    scene = bench.tried(AS_GIVEN, work.scene, {})
+    """Setting of the given scene if the reduced model is slower and less accurate, else None."""
+    bench, setting = state.bench, selected.point.setting
+    scene = bench.tried(AS_GIVEN, state.scene, {})
     if saving is None or saving >= 1 or scene.model is None:
         return None
-    if scene.error >= chosen.tried.error or scene.error > work.enough:
+    if scene.error >= selected.tried.error or scene.error > state.enough:
         return None
-    if chosen.whole:
-        instead = whole_run_tolerance(scene, work, work.beside_unseen - scene.error)
+    if selected.whole:
+        given = whole_run_tolerance(scene, state, state.beside_unseen - scene.error)
     else:
         trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.left())
         error = max_error(trial, bench.reference, bench.measure)
-        if isinstance(error, str) or error * bench.span.growth > work.beside_unseen:
+        if isinstance(error, str) or error * bench.span.growth > state.beside_unseen:
             return None
-        instead = SelectedSetting(
+        given = SelectedSetting(
             scene, Point(replace(setting, model=AS_GIVEN), error, trial.cpu_s, 1)
         )
-    if instead is not None:
-        work.told[AS_GIVEN] = ()
-        work.notes.append(
-            f"a smaller model errs by {chosen.tried.error:.1e} and takes {1 / saving:.2f} times "
-            f"the time of the scene as given, which errs by {scene.error:.1e}: the scene stays as "
-            "it is"
+    if given is not None:
+        state.told[AS_GIVEN] = ()
+        state.notes.append(
+            f"the scene is not reduced: a smaller model has an error of {selected.tried.error:.1e} "
+            f"and takes {1 / saving:.2f} times the time of the scene as given, whose error is "
+            f"{scene.error:.1e}"
         )
-    return instead
+    return given
 
 
 def _bodies_as_given(
-    work: AdviceState, evidence: Mapping[str, ErrorPrediction]
+    state: AdviceState, evidence: Mapping[str, ErrorPrediction]
 ) -> tuple[BodyAdvice, ...]:
-    """Every flexible body as the scene has it."""
-    written = {name: _given(work, name) for name in work.whole}
-    why = "stays as it is: less of the scene takes longer and errs more"
+    """Advice to keep every flexible body as it is in the scene."""
+    models = {name: _given_model(state, name) for name in state.whole}
+    reason = "stays as it is: a smaller model of the scene is slower and less accurate"
     return tuple(
-        BodyAdvice(name, choice, choice, None, None, why, evidence.get(name))
-        for name, choice in written.items()
+        BodyAdvice(name, model, model, None, None, reason, evidence.get(name))
+        for name, model in models.items()
     )
 
 
-def _compared(work: AdviceState, chosen: SelectedSetting) -> str:
-    """Over what errors were seen."""
-    bench, said = work.bench, str(work.bench.span)
-    if chosen.whole:
-        said += f" (the integration over all of its {work.asked.t_end:g} s)"
+def _comparison_text(state: AdviceState, selected: SelectedSetting) -> str:
+    """Description of the time span over which errors were measured."""
+    bench, text = state.bench, str(state.bench.span)
+    if selected.whole:
+        text += f" (the integration over all of its {state.asked.t_end:g} s)"
     ended = bench.reference.ended
-    return f"{said}, up to its end at {bench.reference.t[-1]:.4g} s: {ended}" if ended else said
+    return f"{text}, up to its end at {bench.reference.t[-1]:.4g} s: {ended}" if ended else text
 
 
-def _body(
-    work: AdviceState,
+def _body_advice(
+    state: AdviceState,
     name: str,
     choice: BodyModel,
-    known: ErrorPrediction | None,
+    prediction: ErrorPrediction | None,
     search: ModelSearch,
 ) -> BodyAdvice:
-    """What is said of one body; its choice is tried alone beside the richest of all others."""
-    most = work.bodies.richest
-    as_in_most = choice == most.get(name, choice)
-    error, saving = (work.bench.floor, 1.0) if as_in_most else (None, None)
-    if not as_in_most and work.budget.left():
-        alone = search.tried({**most, name: choice})
-        if math.isfinite(alone.error):
-            whole_model = search.tried(most)
-            error, saving = alone.error, whole_model.cpu_s / alone.cpu_s
+    """Advice for one body; its choice alone is tried with the richest models of all others."""
+    richest_choices = state.bodies.richest
+    is_richest = choice == richest_choices.get(name, choice)
+    error, saving = (state.bench.floor, 1.0) if is_richest else (None, None)
+    if not is_richest and state.budget.left():
+        single = search.tried({**richest_choices, name: choice})
+        if math.isfinite(single.error):
+            richest_model = search.tried(richest_choices)
+            error, saving = single.error, richest_model.cpu_s / single.cpu_s
     split = None
-    if known is not None and work.steep(known) and name not in work.parts:
-        split = work.split_error or known.frame_error * work.in_measure
-    richest = most.get(name, choice) if name in work.parts else work.whole[name]
-    why = reason(choice, richest, known, work.in_measure, work.asked.error)
-    if split is not None and known is not None:
-        why += f"; it bends by a slope of {known.slope:.2g}, so that one floating frame "
-        why += (
-            f"was seen to err by {split:.1e}, which is little beside what is asked"
-            if work.split_error is not None
-            else f"may err by {split:.1e}: split it into welded beams"
+    if prediction is not None and state.steep(prediction) and name not in state.parts:
+        split = state.split_error or prediction.frame_error * state.in_measure
+    is_part = name in state.parts
+    richest = richest_choices.get(name, choice) if is_part else state.whole[name]
+    reason = choice_reason(choice, richest, prediction, state.in_measure, state.asked.error)
+    if split is not None and prediction is not None:
+        reason += f"; its slope is {prediction.slope:.2g}, for which one floating frame "
+        reason += (
+            f"has a measured error of {split:.1e}, small compared with the target error"
+            if state.split_error is not None
+            else f"may have an error of {split:.1e}: split it into welded beams"
         )
-    return BodyAdvice(name, _given(work, name), choice, error, saving, why, known, split)
+    return BodyAdvice(
+        name, _given_model(state, name), choice, error, saving, reason, prediction, split
+    )
 
 
-def _straightened(work: AdviceState) -> Choices:
-    """Bodies that do not bend at all in the plane of the motion."""
+def _undeformed_bodies(state: AdviceState) -> Choices:
+    """Rigid models of the bodies that do not deform in the plane of motion."""
     return {
         name: BodyModel(RIGID)
-        for name in work.whole
-        if name not in work.bodies.richest and name not in work.parts.values()
+        for name in state.whole
+        if name not in state.bodies.richest and name not in state.parts.values()
     }
 
 
-def _given(work: AdviceState, name: str) -> BodyModel:
-    """What a body, or the whole that it is a part of, is in the scene as it was written."""
-    bodies: tuple[Beam | Elastic, ...] = (*work.scene.beam, *work.scene.elastic)
-    of = work.parts.get(name, name)
-    written = next(body for body in bodies if body.name == of)
-    return given_choice(written, work.whole[of])
+def _given_model(state: AdviceState, name: str) -> BodyModel:
+    """Model of a body in the given scene; for a part of a split beam, that of the whole beam."""
+    bodies: tuple[Beam | Elastic, ...] = (*state.scene.beam, *state.scene.elastic)
+    whole = state.parts.get(name, name)
+    given = next(body for body in bodies if body.name == whole)
+    return given_body_model(given, state.whole[whole])
 
 
-def _savings(work: AdviceState, chosen: SelectedSetting) -> tuple[float | None, float | None]:
-    """Time of the scene as given over that of the advised one, by the same tolerance; of the
-    default method and tolerance over the advised ones."""
-    setting, tried, rounds = chosen.point.setting, chosen.tried, work.asked.rounds
+def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | None, float | None]:
+    """Factors of CPU time saved by the model, and by method and tolerance; None if unknown.
+
+    The first compares the given scene with the advised one at the same tolerance, the second the
+    default setting with the advised one on the advised scene.
+    """
+    setting, tried, rounds = selected.point.setting, selected.tried, state.asked.rounds
     rtol = RTOL if setting.fixed else setting.value
-    alike = Setting(AUTO, tried.name, rtol)
-    as_given = work.bench.tried(AS_GIVEN, work.scene, {})
-    found: list[float | None] = [None, None]
-    pairs = (
-        (as_given, alike, alike), (tried, Setting(METHOD, tried.name, RTOL), setting),
-    )  # fmt: skip
-    for k, (other, theirs, ours) in enumerate(pairs):
-        if other.scene == tried.scene and theirs == ours:
-            found[k] = 1.0
-        elif other.model is not None:
-            times = compare_cpu_times(other, theirs, tried, ours, work.bench, rounds)
-            found[k] = None if times is None else times[0] / times[1]
-    return found[0], found[1]
+    same_setting = Setting(AUTO, tried.name, rtol)
+    default_setting = Setting(METHOD, tried.name, RTOL)
+    given = state.bench.tried(AS_GIVEN, state.scene, {})
+    savings: list[float | None] = []
+    for model, before, after in (
+        (given, same_setting, same_setting), (tried, default_setting, setting),
+    ):  # fmt: skip
+        saving = None
+        if model.scene == tried.scene and before == after:
+            saving = 1.0
+        elif model.model is not None:
+            times = compare_cpu_times(model, before, tried, after, state.bench, rounds)
+            saving = None if times is None else times[0] / times[1]
+        savings.append(saving)
+    return savings[0], savings[1]

@@ -1,4 +1,4 @@
-"""From a model to its advice: evidence, reference, search, setting, and what each choice does."""
+"""Find the smallest sufficient model: estimates, reference, search, method and tolerance."""
 
 from __future__ import annotations
 
@@ -14,157 +14,172 @@ from ..chart.model_levels import Variant, model_levels
 from ..chart.time_budget import Budget
 from ..integrate.steppers import AUTO
 from .advice import Advice
-from .advice_state import RICHEST, AdviceState, size_of
+from .advice_state import RICHEST, AdviceState, motion_size
 from .advice_summary import build_advice
-from .beam_subdivision import in_parts
+from .beam_subdivision import subdivide_beams
 from .body_model_levels import Bodies
 from .error_predictors import ErrorPrediction, predict_errors
 from .full_run_settings import whole_run_tolerance
-from .hinge_reduction import needless, rigid
+from .hinge_reduction import omission_changes, rigid_hinge_changes
 from .measure_renaming import Renaming
-from .method_selection import SelectedSetting, cheapest
+from .method_selection import SelectedSetting, cheapest_setting
 from .request import Request
-from .scene_reduction import SEARCH, in_plane, merge_welded, reduce_by_halves
+from .scene_reduction import SEARCH, merge_welded, reduce_by_halves, reduce_to_plane
 from .search import Choices, ModelSearch
-from .trial_models import Compile, Tell, TrialResult, TrialRunner, first_rtol, probe
+from .trial_models import Compile, Report, TrialResult, TrialRunner, choose_window, initial_rtol
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: With the integration a model may err by this part of what is asked; the rest is for what lies
-#: between the samples.
-_WITH_SETTING = 0.95
+#: Largest error of model and integration, as a fraction of the target error; the rest is reserved
+#: for times between the samples.
+_TOTAL_ERROR = 0.95
 
-#: Methods may take this part of the budget.
-_SETTINGS = 0.3
+#: Fraction of the budget for the selection of the method.
+_METHOD_BUDGET = 0.3
 
-#: Models whose settings are tried: the one found, and others that suffice and took no longer than
-#: so many times its time; than so many where they err by less than this part of what is asked.
-_FINALISTS, _NEARLY, _ROOMIER, _ROOMY = 3, 1.5, 4.0, 0.3
+#: Number of models for which methods are compared: the one found, and others that suffice and take
+#: at most this many times its CPU time; the second factor holds for errors below this fraction of
+#: the target error.
+_MAX_FINALISTS, _TIME_FACTOR, _ACCURATE_TIME_FACTOR, _ACCURATE = 3, 1.5, 4.0, 0.3
 
-#: Hinges may be made rigid up to this part of what is asked; springs left out up to one, or to so
-#: many times the error that there is.
-_RIGID, _NEEDLESS, _HARDLY = 0.5, 0.1, 1.1
+#: Largest error, as a fraction of the target error, for making hinges rigid and for omitting
+#: springs; springs are also omitted if the error grows at most by this factor.
+_RIGID_ERROR, _OMISSION_ERROR, _OMISSION_GROWTH = 0.5, 0.1, 1.1
 
-#: Most by which errors of a window are multiplied for what deflects more after it.
-_RISE = 100.0
+#: Largest factor on the errors of a window for deflections that grow after it.
+_MAX_RISE = 100.0
 
 
 def make_advice(
-    model: Model, asked: Request, compile: Compile, tell: Tell, state: Tell,
+    model: Model, request: Request, compile: Compile, report: Report, report_status: Report,
     budget: Budget | None = None,
 ) -> Advice:  # fmt: skip
-    """The advice for a model; `compile` makes models of its other levels.
+    """Find the smallest sufficient model; `compile` makes the models that are compared.
 
-    `state` hears what is compared, `tell` every run.  Raises SceneError for an unknown quantity,
-    NumericalFailure where the scene cannot be run or no error of this size be judged.
+    `report_status` is called with a description of the comparison, `report` before every run.
+    Raises SceneError for an unknown quantity, NumericalFailure if the scene cannot be simulated or
+    errors of this size cannot be resolved.
     """
-    work = AdviceState(model.scene, asked, budget or Budget(asked.budget), compile, tell)
-    top = model_levels(work.scene)[-1]
+    state = AdviceState(model.scene, request, budget or Budget(request.budget), compile, report)
+    top = model_levels(state.scene)[-1]
     richest = compile(top.scene)
     start = richest.simulate(0.0, method="dop853")
-    work.measure = Renaming(select_measure(richest, start, asked.of, True))
-    work.length = scene_length_with_ends(richest)
-    first = work.least(work.scene)
-    work.size = size_of(work.measure, first)
-    work.bench, base = _bench(work, top, richest, predict_errors(first, work.length)[0], state)
-    evidence, why = work.known(first, richest)
-    if why:
-        work.notes.append(f"nothing is known of the flexible bodies beforehand: {why}")
-    base = in_plane(work, top, richest, base)
-    q = work.bench.reference.q
-    work.whole = Bodies(top.scene).richest
-    base, evidence = in_parts(work, base, evidence)
-    still = rigid(base.scene, richest, q, work.length)
-    base = reduce_by_halves(work, base, "rigid", still, _RIGID * asked.error, cheap=True)
-    work.bench.names = work.measure.names_in(base.running)
-    return _reduced(work, base, evidence)
+    state.measure = Renaming(select_measure(richest, start, request.of, True))
+    state.length = scene_length_with_ends(richest)
+    one_way = state.least(state.scene)
+    state.size = motion_size(state.measure, one_way)
+    predictions = predict_errors(one_way, state.length)[0]
+    state.bench, base = _make_runner(state, top, richest, predictions, report_status)
+    evidence, reason = state.known(one_way, richest)
+    if reason:
+        state.notes.append(f"no error estimates for the flexible bodies: {reason}")
+    base = reduce_to_plane(state, top, richest, base)
+    q = state.bench.reference.q
+    state.whole = Bodies(top.scene).richest
+    base, evidence = subdivide_beams(state, base, evidence)
+    changes = rigid_hinge_changes(base.scene, richest, q, state.length)
+    max_error = _RIGID_ERROR * request.error
+    base = reduce_by_halves(state, base, "rigid", changes, max_error, cheap=True)
+    state.bench.names = state.measure.names_in(base.running)
+    return _reduce_bodies(state, base, evidence)
 
 
-def _bench(
-    work: AdviceState,
+def _make_runner(
+    state: AdviceState,
     top: Variant,
     model: Model,
     evidence: Mapping[str, ErrorPrediction],
-    state: Tell,
+    report_status: Report,
 ) -> tuple[TrialRunner, TrialResult]:
-    """The bench with its reference, over the whole run or a window."""
-    asked = work.asked
-    rtol = first_rtol(work.part)
-    span = probe(model, asked.t_end, asked.samples, work.budget, work.measure, rtol)
+    """Runner of trial models with its reference, over the whole run or a window of it."""
+    request = state.asked
+    rtol = initial_rtol(state.part)
+    span = choose_window(model, request.t_end, request.samples, state.budget, state.measure, rtol)
     if not span.whole:
-        rise = max((one.rise(span.t_end) for one in evidence.values()), default=1.0)
-        span = replace(span, rise=min(rise, _RISE))
-    bench = TrialRunner(span, asked.samples, work.budget, work.measure, work.compile, work.tell)
-    richest = bench.refer_to(top.scene, model, RICHEST, asked.error, work.part)
-    state(f"models are compared over {span}; the reference itself errs by about "
-               f"{richest.error:.1e}")  # fmt: skip
+        rise = max((prediction.rise(span.t_end) for prediction in evidence.values()), default=1.0)
+        span = replace(span, rise=min(rise, _MAX_RISE))
+    runner = TrialRunner(
+        span, request.samples, state.budget, state.measure, state.compile, state.tell
+    )
+    richest = runner.refer_to(top.scene, model, RICHEST, request.error, state.part)
+    report_status(
+        f"models are compared over {span}; error of the reference about {richest.error:.1e}"
+    )
     if not span.whole:
-        work.notes.append(
-            "what moves after the window was not seen: planes, hinges, springs and dampers stay "
-            "as they are; give more --budget to have them looked at"
+        state.notes.append(
+            "motion after the window was not simulated: plane, hinges, springs and dampers stay as "
+            "they are; give a larger --budget to have them examined"
         )
-    return bench, richest
+    return runner, richest
 
 
-def _reduced(
-    work: AdviceState, base: TrialResult, evidence: Mapping[str, ErrorPrediction]
+def _reduce_bodies(
+    state: AdviceState, base: TrialResult, evidence: Mapping[str, ErrorPrediction]
 ) -> Advice:
-    """The advice for a scene whose plane, beams and hinges are settled."""
-    work.bodies = Bodies(base.scene)
+    """Advice for a scene whose plane, beams and rigid hinges have been decided."""
+    state.bodies = Bodies(base.scene)
     search = ModelSearch(
-        work.bodies, work.bench, evidence, work.enough, work.in_measure,
-        lambda: work.budget.left(SEARCH) > 0,
+        state.bodies, state.bench, evidence, state.enough, state.in_measure,
+        lambda: state.budget.left(SEARCH) > 0,
     )  # fmt: skip
     for name in (RICHEST, base.name):
-        search.made[name] = work.bodies.richest
-    choices, best = search.run() if work.bodies.richest else ({}, base)
-    work.skipped += [f"less of body {name}" for name in search.skipped]
-    work.told.setdefault(best.name, work.told[base.name])
-    enough = max(_NEEDLESS * work.asked.error, _HARDLY * best.error)
-    best = reduce_by_halves(work, best, "without", needless(best.scene), enough, cheap=False)
-    best = merge_welded(work, best, enough)
+        search.made[name] = state.bodies.richest
+    choices, best = search.run() if state.bodies.richest else ({}, base)
+    state.skipped += [f"smaller models of body {name}" for name in search.skipped]
+    state.told.setdefault(best.name, state.told[base.name])
+    max_error = max(_OMISSION_ERROR * state.asked.error, _OMISSION_GROWTH * best.error)
+    best = reduce_by_halves(
+        state, best, "without", omission_changes(best.scene), max_error, cheap=False
+    )
+    best = merge_welded(state, best, max_error)
     search.made.setdefault(best.name, choices)
-    chosen = _chosen(work, best, choices, search)
-    choices = search.made.get(chosen.tried.name, choices)
-    return build_advice(work, choices, evidence, chosen, search, base.name)
+    selected = _select_setting(state, best, choices, search)
+    choices = search.made.get(selected.tried.name, choices)
+    return build_advice(state, choices, evidence, selected, search, base.name)
 
 
-def _chosen(
-    work: AdviceState, best: TrialResult, choices: Choices, search: ModelSearch
+def _select_setting(
+    state: AdviceState, best: TrialResult, choices: Choices, search: ModelSearch
 ) -> SelectedSetting:
-    """The cheapest setting of the model found, or of another one that nearly is as cheap; a
-    model that leaves more of the error to the integration may be cheaper in the end."""
-    asked = work.beside_unseen
-    if best.error > _ROOMY * asked and choices != work.bodies.richest:
+    """Cheapest setting of the model found, or of another one that is nearly as fast.
+
+    A more accurate model leaves more of the target error to the integration, and may be cheaper in
+    total.
+    """
+    available = state.beside_unseen
+    if best.error > _ACCURATE * available and choices != state.bodies.richest:
         search.tried(search.richer(choices))
     others = sorted(
         (
-            one
-            for one in work.bench.all
-            if search.made.get(one.name, choices) != choices and _may_be_cheapest(work, one, best)
+            tried
+            for tried in state.bench.all
+            if search.made.get(tried.name, choices) != choices
+            and _may_be_cheapest(state, tried, best)
         ),
-        key=lambda one: one.cpu_s,
+        key=lambda tried: tried.cpu_s,
     )
-    if not work.bench.span.whole:
-        beyond = whole_run_tolerance(best, work, _WITH_SETTING * asked - best.error)
-        if beyond is not None:
-            return beyond
-        work.notes.append(
-            "method and tolerance were judged in the window, too: what they err after it is guessed"
+    if not state.bench.span.whole:
+        selected = whole_run_tolerance(best, state, _TOTAL_ERROR * available - best.error)
+        if selected is not None:
+            return selected
+        state.notes.append(
+            "method and tolerance were selected over the window only: their error after it is "
+            "extrapolated"
         )
-    finalists = [best, *others][:_FINALISTS]
-    seconds = max(_SETTINGS * work.asked.budget, work.budget.left())
-    asked, growth = _WITH_SETTING * asked, work.bench.span.growth
+    finalists = [best, *others][:_MAX_FINALISTS]
+    seconds = max(_METHOD_BUDGET * state.asked.budget, state.budget.left())
+    max_error, growth = _TOTAL_ERROR * available, state.bench.span.growth
     try:
-        return cheapest(
-            finalists, work.bench, asked / growth, work.asked.of, work.asked.rounds, seconds
+        return cheapest_setting(
+            finalists, state.bench, max_error / growth, state.asked.of, state.asked.rounds, seconds
         )
-    except NumericalFailure:  # then as all models were run
-        setting = Setting(AUTO, best.name, work.bench.rtol)
+    except NumericalFailure:  # keep the setting of the trial runs
+        setting = Setting(AUTO, best.name, state.bench.rtol)
         return SelectedSetting(best, Point(setting, best.error / growth, best.cpu_s, 1))
 
 
-def _may_be_cheapest(work: AdviceState, one: TrialResult, best: TrialResult) -> bool:
-    times = _NEARLY if one.error > _ROOMY * work.asked.error else _ROOMIER
-    return one.error <= work.enough and one.cpu_s <= times * best.cpu_s
+def _may_be_cheapest(state: AdviceState, tried: TrialResult, best: TrialResult) -> bool:
+    is_accurate = tried.error <= _ACCURATE * state.asked.error
+    factor = _ACCURATE_TIME_FACTOR if is_accurate else _TIME_FACTOR
+    return tried.error <= state.enough and tried.cpu_s <= factor * best.cpu_s

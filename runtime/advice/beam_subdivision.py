@@ -1,4 +1,4 @@
-"""Beams in parts where one floating frame cannot follow them; the finest ones are the reference."""
+"""Split beams whose bending exceeds one floating frame; the finest split is the reference."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from mstmm.scene import Scene
 from mstmm.scene.tables.beam import Beam
 
 from ..chart.model_levels import with_tables
-from .beam_splitting import SplitScene, divisible, unfit
-from .beam_splitting import in_parts as cut
+from .beam_splitting import SplitScene, make_splittable, split_beams, split_obstacle
 from .body_model_levels import Bodies
 from .error_predictors import ErrorPrediction
 from .trial_models import TrialResult
@@ -21,129 +20,143 @@ if TYPE_CHECKING:
     from ..chart.trial_run import Trial
     from .advice_state import AdviceState
 
-#: Beams are split until the next halving changes less than this part of what is asked; what the
-#: finer ones err by themselves is so many times less.
-_PARTS, _FALLS = 0.5, 4.0
+#: Beams are halved until the result changes by less than this fraction of the target error; the
+#: error of the finer parts is smaller than this change by the second factor.
+_MAX_CHANGE, _ERROR_REDUCTION = 0.5, 4.0
 
 #: Numbers of parts that are tried.
 _COUNTS = (2, 4, 8, 16)
 
-#: What has to change of a beam before it can be split may change this part of what is asked.
-_ALIKE = 0.3
+#: Largest error, as a fraction of the target error, of the changes that make a beam splittable.
+_PREPARATION_ERROR = 0.3
 
 
-def in_parts(
-    work: AdviceState, base: TrialResult, evidence: dict[str, ErrorPrediction]
+def subdivide_beams(
+    state: AdviceState, base: TrialResult, evidence: dict[str, ErrorPrediction]
 ) -> tuple[TrialResult, dict[str, ErrorPrediction]]:
-    """The richest scene with beams split that one frame cannot follow, and its evidence.
+    """Split the beams that bend too far for one frame; return the model and its evidence.
 
-    They are halved until the next halving changes little; the finest one is the reference.
+    They are halved until the result hardly changes; the finest split becomes the reference.
     """
-    steep = {one.name for one in base.scene.beam if work.steep(evidence.get(one.name))}
-    steep -= {one.name for one in base.scene.beam if unfit(one)}
+    steep = {beam.name for beam in base.scene.beam if state.steep(evidence.get(beam.name))}
+    steep -= {beam.name for beam in base.scene.beam if split_obstacle(beam)}
     if not steep:
         return base, evidence
     try:
-        whole, run, told = _divisible(work, base, steep, evidence)
-        found, finer, apart = _halved(work, whole, run, steep)
+        whole, run, changes = _prepare_splitting(state, base, steep, evidence)
+        split, finest, change = _refine_parts(state, whole, run, steep)
     except MstmmError as problem:
-        work.notes.append(f"beams could not be split: {problem}")
+        state.notes.append(f"beams could not be split: {problem}")
         return base, evidence
-    if found.scene is whole:
-        work.split_error = apart if math.isfinite(apart) else None
-        work.unseen = 0.0
+    if split.scene is whole:
+        state.split_error = change if math.isfinite(change) else None
+        state.unseen = 0.0
         return base, evidence
-    left = apart / _FALLS
-    work.unseen += left
-    if apart > _PARTS * work.asked.error:
-        work.notes.append(
-            f"the last halving of beams still changed {apart:.1e}: what is left of that, about "
-            f"{left:.1e}, counts with the error"
+    remaining = change / _ERROR_REDUCTION
+    state.unseen += remaining
+    if change > _MAX_CHANGE * state.asked.error:
+        state.notes.append(
+            f"the last halving of beams still changed the result by {change:.1e}; the error "
+            f"includes an estimated remainder of {remaining:.1e}"
         )
-    return _of_parts(work, base, found, finer, told)
+    return _compare_with_parts(state, base, split, finest, changes)
 
 
-def _divisible(
-    work: AdviceState, base: TrialResult, steep: set[str], evidence: Mapping[str, ErrorPrediction]
+def _prepare_splitting(
+    state: AdviceState, base: TrialResult, steep: set[str], evidence: Mapping[str, ErrorPrediction]
 ) -> tuple[Scene, Trial, tuple[str, ...]]:
-    """The scene whose beams can be split, its run, and what was changed for that in words; those
-    that would do something else then are no longer among the steep ones."""
-    scene, said = _with_divisible(base.scene, steep, evidence)
-    if not said:
-        return scene, work.bench.finer(scene, work.bench.names, base.name), ()
-    run = work.bench.finer(scene, work.bench.names, "beams that can be split")
-    apart = math.inf if run.numbers is None else work.bench.apart(work.bench.reference, run)
-    if apart <= _ALIKE * work.asked.error:
-        work.unseen = apart
-        words = (f'beam "{name}": {what}, which changes {apart:.1e}' for name, what in said.items())
-        return scene, run, tuple(words)
-    work.notes += [
-        f'beam "{name}" stays whole: {what}, as it needs to be split, changes {apart:.1e}'
-        for name, what in said.items()
+    """The scene with splittable beams, its run, and a sentence for each change.
+
+    If these changes alter the motion too much, their beams are removed from `steep`.
+    """
+    scene, changes = _splittable_scene(base.scene, steep, evidence)
+    if not changes:
+        return scene, state.bench.finer(scene, state.bench.names, base.name), ()
+    run = state.bench.finer(scene, state.bench.names, "splittable beams")
+    error = math.inf if run.numbers is None else state.bench.apart(state.bench.reference, run)
+    if error <= _PREPARATION_ERROR * state.asked.error:
+        state.unseen = error
+        sentences = (
+            f'beam "{name}": {change}, which changes the result by {error:.1e}'
+            for name, change in changes.items()
+        )
+        return scene, run, tuple(sentences)
+    state.notes += [
+        f'beam "{name}" is not split: this requires {change}, which changes the result by '
+        f"{error:.1e}"
+        for name, change in changes.items()
     ]
-    steep -= {*said}
-    return base.scene, work.bench.finer(base.scene, work.bench.names, base.name), ()
+    steep -= {*changes}
+    return base.scene, state.bench.finer(base.scene, state.bench.names, base.name), ()
 
 
-def _with_divisible(
+def _splittable_scene(
     scene: Scene, steep: set[str], evidence: Mapping[str, ErrorPrediction]
 ) -> tuple[Scene, dict[str, str]]:
-    said = {}
+    """The scene with splittable beams, and the change of each beam in words."""
+    changes = {}
 
-    def changed(beam: Beam) -> Beam:
+    def splittable(beam: Beam) -> Beam:
         if beam.name not in steep:
             return beam
-        made, what = divisible(beam, evidence[beam.name].frequency)
-        if what:
-            said[beam.name] = what
-        return made
+        changed, change = make_splittable(beam, evidence[beam.name].frequency)
+        if change:
+            changes[beam.name] = change
+        return changed
 
-    beams = tuple(map(changed, scene.beam))
-    return with_tables(scene, beam=beams) if said else scene, said
+    beams = tuple(map(splittable, scene.beam))
+    return with_tables(scene, beam=beams) if changes else scene, changes
 
 
-def _halved(
-    work: AdviceState, whole: Scene, run: Trial, names: set[str]
+def _refine_parts(
+    state: AdviceState, whole: Scene, run: Trial, names: set[str]
 ) -> tuple[SplitScene, Trial, float]:
-    """The scene with beams in enough parts, the finest run, and what the last halving changed."""
-    found, apart = SplitScene(whole, {}, {}), math.inf
+    """The scene with beams in enough parts, the finest run, and the change by the last halving."""
+    split, change = SplitScene(whole, {}, {}), math.inf
     for count in _COUNTS if names else ():
-        parts = cut(whole, names, count)
-        finer = work.bench.finer(parts.scene, parts.names, f"beams in {count} parts")
+        parts = split_beams(whole, names, count)
+        finer = state.bench.finer(parts.scene, parts.names, f"beams in {count} parts")
         if finer.numbers is None:
-            work.notes.append(f"beams could not be run in {count} parts: {finer.failure}")
+            state.notes.append(f"beams in {count} parts could not be simulated: {finer.failure}")
             break
-        apart = work.bench.apart(run, finer)
-        if apart <= _PARTS * work.asked.error:
-            return found, finer, apart
-        found, run = parts, finer
-    return found, run, apart
+        change = state.bench.apart(run, finer)
+        if change <= _MAX_CHANGE * state.asked.error:
+            return split, finer, change
+        split, run = parts, finer
+    return split, run, change
 
 
-def _of_parts(
-    work: AdviceState, base: TrialResult, found: SplitScene, reference: Trial, told: tuple[str, ...]
+def _compare_with_parts(
+    state: AdviceState,
+    base: TrialResult,
+    split: SplitScene,
+    reference: Trial,
+    changes: tuple[str, ...],
 ) -> tuple[TrialResult, dict[str, ErrorPrediction]]:
-    """The scene in parts as the richest one, beside a reference with as many parts or more."""
-    work.parts = found.parts
-    work.whole = {**Bodies(found.scene).richest, **work.whole}
-    single = work.bench.apart(work.bench.reference, reference)
-    work.bench.refer_again(reference, found.names)
-    tried = work.bench.tried("beams in parts", found.scene)
-    wholes: dict[str, list[str]] = {}
-    for part, of in found.parts.items():
-        wholes.setdefault(of, []).append(part)
-    work.told[tried.name] = (*work.told[base.name], *told, *(
-        f'beam "{of}": {len(parts)} welded beams ({", ".join(parts)}) with frames of their '
-        f"own, for with one frame it errs by {single:.1e}" + _other_names(of, found.names)
-        for of, parts in wholes.items()
+    """Use the split scene as the richest model; return it and its evidence.
+
+    `reference` is a run with as many parts or more.
+    """
+    state.parts = split.parts
+    state.whole = {**Bodies(split.scene).richest, **state.whole}
+    single_frame_error = state.bench.apart(state.bench.reference, reference)
+    state.bench.refer_again(reference, split.names)
+    tried = state.bench.tried("beams in parts", split.scene)
+    parts_by_beam: dict[str, list[str]] = {}
+    for part, beam in split.parts.items():
+        parts_by_beam.setdefault(beam, []).append(part)
+    state.told[tried.name] = (*state.told[base.name], *changes, *(
+        f'beam "{beam}": {len(parts)} welded beams ({", ".join(parts)}) with a frame each; with '
+        f"one frame its error is {single_frame_error:.1e}" + _renamed_ends(beam, split.names)
+        for beam, parts in parts_by_beam.items()
     ))  # fmt: skip
-    evidence, why = work.known(work.least(found.scene), tried.running)
-    if why:
-        work.notes.append(f"nothing is known of the parts of beams beforehand: {why}")
+    evidence, reason = state.known(state.least(split.scene), tried.running)
+    if reason:
+        state.notes.append(f"no error estimates for the parts of beams: {reason}")
     return tried, evidence
 
 
-def _other_names(of: str, names: Mapping[str, str]) -> str:
-    """Ends of a beam that are those of a part now: their former names are ends of another one."""
-    own = [f"{old} is {new}" for old, new in names.items() if old.startswith(f"{of}.")]
-    return f"; {', '.join(own)} now" if own else ""
+def _renamed_ends(beam: str, names: Mapping[str, str]) -> str:
+    """Ends of a beam that are now ends of a part, whose former names mean other places."""
+    ends = [f"{old} is {new}" for old, new in names.items() if old.startswith(f"{beam}.")]
+    return f"; {', '.join(ends)} now" if ends else ""

@@ -1,4 +1,4 @@
-"""A level of model for each flexible body, and the scene that has it."""
+"""Model level of each flexible body, and the scene with these levels."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from ..packing.flexible.rigid_substitution import LEVELS
 
 RIGID, ONE_WAY, LINEAR, STIFFENED = "rigid", "one-way", "linear", "stiffened"
 
-#: What the shapes of an elastic body are counted under: vibration shapes beside its static ones.
+#: Key of the number of shapes of an elastic body: its vibration shapes, without the static ones.
 VIBRATION = "vibration"
 
 
 @dataclass(frozen=True)
 class BodyModel:
-    """What one flexible body is to be.
+    """Model level and shapes of one flexible body.
 
     Attributes:
         level: rigid, one-way, linear or stiffened.
-        shapes: (direction, how many of its first shapes), directions without any left out; of an
-            elastic body ("vibration", n) beside its static ones.
+        shapes: (direction, number of its first shapes), without directions that have none; of an
+            elastic body ("vibration", n) in addition to its static shapes.
     """
 
     level: str
@@ -35,16 +35,16 @@ class BodyModel:
 
     @property
     def coupled(self) -> bool:
-        """Whether its shapes move together with the hinges."""
+        """Whether the body is coupled with the motion of the hinges."""
         return self.level in (LINEAR, STIFFENED)
 
     @property
     def total(self) -> int:
-        """How many shapes a run integrates."""
-        return sum(n for _, n in self.shapes) if self.coupled else 0
+        """Number of shapes that are integrated in a run."""
+        return sum(count for _, count in self.shapes) if self.coupled else 0
 
     def keeps(self, mode: str) -> bool:
-        """Whether a shape of this name ("y2") is among those kept; static shapes always are."""
+        """Whether a shape of this name ("y2") is kept; static shapes always are."""
         direction = mode.rstrip("0123456789")
         counts = dict(self.shapes)
         if VIBRATION in counts:
@@ -52,62 +52,67 @@ class BodyModel:
         return int(mode[len(direction) :]) <= counts.get(direction, 0)
 
     def with_count(self, direction: str, count: int) -> BodyModel:
-        """With so many shapes in one direction."""
+        """Copy with this number of shapes in one direction."""
         counts = {**dict(self.shapes), direction: count}
-        always = direction == VIBRATION  # static shapes stay where no vibration does
-        kept = tuple((word, n) for word, n in counts.items() if n or always)
-        return BodyModel(self.level, tuple(sorted(kept, key=lambda pair: _place(pair[0]))))
+        keep_zero = direction == VIBRATION  # static shapes remain without vibration shapes
+        shapes = [pair for pair in counts.items() if pair[1] or keep_zero]
+        shapes.sort(key=lambda pair: _direction_index(pair[0]))
+        return BodyModel(self.level, tuple(shapes))
 
     def __str__(self) -> str:
         if self.level == RIGID:
             return RIGID
-        parts = [_counted(word, n) for word, n in self.shapes]
+        parts = [_count_text(direction, count) for direction, count in self.shapes]
         return f"{self.level}, shapes {' + '.join(parts)}" if parts else self.level
 
 
-def _counted(direction: str, n: int) -> str:
+def _count_text(direction: str, count: int) -> str:
     if direction != VIBRATION:
-        return f"{n} {direction}"
-    return f"static + {n} of vibration" if n else "static alone"
+        return f"{count} {direction}"
+    return f"static + {count} vibration" if count else "static only"
 
 
-def _place(direction: str) -> int:
+def _direction_index(direction: str) -> int:
     return DIRECTIONS.index(direction) if direction in DIRECTIONS else len(DIRECTIONS)
 
 
 class Bodies:
-    """The flexible bodies of a scene in its richest form, and the scene with others' choices."""
+    """Flexible bodies of a scene: their richest models, and the scene with other models."""
 
     def __init__(self, richest: Scene) -> None:
         self.scene = richest
         self._modes = beam_modes(richest)
         self.richest: dict[str, BodyModel] = {}
-        found: tuple[Beam | Elastic, ...] = (*richest.beam, *richest.elastic)
-        for body in found:
+        bodies: tuple[Beam | Elastic, ...] = (*richest.beam, *richest.elastic)
+        for body in bodies:
             if body.model != RIGID:
                 level = STIFFENED if body.stiffening else LINEAR
-                self.richest[body.name] = BodyModel(level, self._counts(body))
+                self.richest[body.name] = BodyModel(level, self._shape_counts(body))
 
-    def _counts(self, body: Beam | Elastic) -> tuple[tuple[str, int], ...]:
+    def _shape_counts(self, body: Beam | Elastic) -> tuple[tuple[str, int], ...]:
         if isinstance(body, Elastic):
             return ((VIBRATION, vibration_mode_count(body)),)
         modes = self._modes[body.name]
-        return tuple((w, getattr(modes, w)) for w in DIRECTIONS if getattr(modes, w))
+        return tuple(
+            (direction, getattr(modes, direction))
+            for direction in DIRECTIONS
+            if getattr(modes, direction)
+        )
 
     def scene_of(self, choices: Mapping[str, BodyModel]) -> Scene:
-        """The scene with these choices."""
+        """The scene with these models of its flexible bodies."""
 
-        def changed(body: Any) -> Any:
+        def chosen(body: Any) -> Any:
             choice = choices.get(body.name)
-            return body if choice is None else self._changed(body, choice)
+            return body if choice is None else self._with_choice(body, choice)
 
         return with_tables(
             self.scene,
-            beam=tuple(map(changed, self.scene.beam)),
-            elastic=tuple(map(changed, self.scene.elastic)),
+            beam=tuple(map(chosen, self.scene.beam)),
+            elastic=tuple(map(chosen, self.scene.elastic)),
         )
 
-    def _changed(self, body: Any, choice: BodyModel) -> Any:
+    def _with_choice(self, body: Any, choice: BodyModel) -> Any:
         if not choice.coupled:
             return body.model_copy(update={"model": LEVELS[choice.level]})
         update: dict[str, Any] = {
@@ -119,8 +124,8 @@ class Bodies:
         return with_mode_counts(body, self._modes[body.name], kept).model_copy(update=update)
 
 
-def given_choice(body: Beam | Elastic, richest: BodyModel) -> BodyModel:
-    """What a body is in the scene as it was written."""
+def given_body_model(body: Beam | Elastic, richest: BodyModel) -> BodyModel:
+    """Model of a body in the given scene."""
     if body.model == ONE_WAY:
         return BodyModel(ONE_WAY, richest.shapes)
     return BodyModel(STIFFENED if body.stiffening else LINEAR, richest.shapes)

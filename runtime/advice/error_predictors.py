@@ -1,12 +1,12 @@
-"""What is expected of each flexible body before any richer model runs.
+"""Error estimates for the models of each flexible body, before richer models are run.
 
-From one run in which all of them respond one way, and from invariants.  Per body: how far its
-ends deflect (d), the share of the inertia at its hinge that a shape holds (chi), what its loads
-change of its stiffness (gamma), its largest slope (kappa).  A rigid body errs by d, a one-way
-response by about 3 d chi / (1 - chi), linear kinematics by d gamma, shapes left out by what they
-deflect the ends, and any single floating frame by up to d kappa^2 / 2.
+They use a run with one-way coupling and properties of the body: deflection of its ends (d), share
+of the inertia at its hinge that a shape has (chi), relative change of its stiffness by loads
+(gamma) and largest slope (kappa).  The error of a rigid body is d, of one-way coupling about
+3 d chi / (1 - chi), of linear kinematics d gamma, of omitted shapes their deflection of the ends,
+and of a single floating frame up to d kappa^2 / 2.
 
-Padilla, von Flotow, J. Guidance 15 (1992) 148-155 (when stress stiffening may be left out).
+Padilla, von Flotow, J. Guidance 15 (1992) 148-155 (when stress stiffening is negligible).
 """
 
 from __future__ import annotations
@@ -32,25 +32,26 @@ if TYPE_CHECKING:
     from ..flexible.modal_body import ModalBody
     from ..result.result import Result
 
-#: Recoil and phase of a response that is not coupled, in d chi / (1 - chi); and the most that it
-#: may err by, in d: out of phase with a recoil as large as itself.
-_RECOIL, _MOST = 3.0, 2.0
+#: Error of one-way coupling by recoil and phase, in d chi / (1 - chi); and its largest value, in d:
+#: out of phase, with a recoil as large as the deflection.
+_RECOIL, _MAX_ONE_WAY = 3.0, 2.0
 
 
 @dataclass(frozen=True)
 class ErrorPrediction:
-    """What a run tells of one body.
+    """Quantities of a run that estimate the errors of the models of one body.
 
     Attributes:
-        deflection: d, m, the largest of its ends, with what its rotation displaces.
-        by_shape: name of a shape -> its part of that, m.
+        deflection: d, m: largest deflection of its ends, with displacements by their rotation.
+        by_shape: name of a shape -> its contribution to d, m.
         coupling: chi.
         load_ratio: gamma.
         slope: kappa.
-        frequency: rad/s, of its first shape.
-        spin_ratio: spin across the body over its first frequency.
-        missed: part of the bending energy that all its shapes miss; None where it is not known.
-        course: (t, deflection) over the samples, s and m.
+        frequency: of the first shape, rad/s.
+        spin_ratio: spin normal to the body over its first frequency.
+        missed: truncated energy: fraction of the bending energy that its shapes miss; None if
+            unknown.
+        course: (t, deflection) at the samples, s and m.
     """
 
     deflection: float
@@ -64,30 +65,30 @@ class ErrorPrediction:
     course: tuple[tuple[float, float], ...] = ()
 
     def error(self, choice: BodyModel) -> float:
-        """Expected of a choice, m."""
+        """Estimated error of a model, m."""
         d, chi = self.deflection, self.coupling
         if choice.level == RIGID:
             return d
         shortening = d * self.load_ratio
         if choice.level == ONE_WAY:
-            recoil = _RECOIL * chi / (1 - chi) if chi < 1 else _MOST
-            return d * min(recoil, _MOST) + shortening
+            recoil = _RECOIL * chi / (1 - chi) if chi < 1 else _MAX_ONE_WAY
+            return d * min(recoil, _MAX_ONE_WAY) + shortening
         left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps(name))
         return left_out + (shortening if choice.level == LINEAR else 0.0)
 
     def rise(self, until: float) -> float:
-        """How many times more it deflects at any time than up to one, s."""
+        """Ratio of the largest deflection to that until a time, s."""
         before = max((size for t, size in self.course if t <= until), default=0.0)
         return self.deflection / before if before > 0 else 1.0
 
     @property
     def frame_error(self) -> float:
-        """Of one floating frame, d kappa^2 / 2, m."""
+        """Estimated error of a single floating frame, d kappa^2 / 2, m."""
         return self.deflection * min(self.slope**2 / 2, 1.0)
 
     @property
     def stiffens(self) -> bool:
-        """Whether linear kinematics may diverge."""
+        """Whether linear kinematics may diverge: large stiffening by loads or spin."""
         return self.load_ratio > MAX_LOAD_RATIO or self.spin_ratio > 1.0
 
     def to_dict(self) -> dict[str, Any]:
@@ -97,72 +98,65 @@ class ErrorPrediction:
         return {key: getattr(self, key) for key in keys} | {"by_shape": dict(self.by_shape)}
 
 
-def evidence_of(result: Result, reach: float) -> dict[str, ErrorPrediction]:
-    """Body -> what a run tells in which it responds one way, or coupled; `reach` (m) is how far
-    rotations of ends displace what is fixed there.
+def body_predictions(result: Result, reach: float) -> dict[str, ErrorPrediction]:
+    """Error estimates by body from a run with one-way or coupled flexible bodies.
 
-    Raises NumericalFailure where the response cannot be had.
+    `reach` (m) is the lever arm by which rotations of an end displace the bodies attached to it.
+    Raises NumericalFailure if the elastic response cannot be computed.
     """
     model = result.model
     bodies: Mapping[str, ModalBody] = model.flexible
     if isinstance(result, OneWayResult):
         bodies = rigidified_bodies(model).one_way
-    known = {one.name: one for one in result.certificate.flexible}
-    found = {}
+    ranges = {model_range.name: model_range for model_range in result.certificate.flexible}
+    predictions = {}
     for name, body in bodies.items():
-        if name in known:
-            eta = _coordinates(result, name)
-            loaded = _loaded(result.model, name)
-            found[name] = _one(body, result.t, np.abs(eta), known[name], loaded, reach)
-    return found
+        if name in ranges:
+            eta = np.abs(_modal_coordinates(result, name))
+            loaded = _loaded_ends(result.model, name)
+            predictions[name] = _body_prediction(body, result.t, eta, ranges[name], loaded, reach)
+    return predictions
 
 
-def _coordinates(result: Result, name: str) -> Array:
+def _modal_coordinates(result: Result, name: str) -> Array:
     """(n, modes) modal coordinates."""
     if isinstance(result, OneWayResult):
         return np.asarray(result.response(name).eta)
     return result.q[:, result.model.layout.modal[name].q_slice]
 
 
-def _loaded(model: CompiledScene, name: str) -> set[str]:
-    """Ends at which another body is fixed."""
-    return {
-        end
-        for h in model.scene.hinge
-        for body, end in (split_reference(h.inboard),)
-        if body == name
-    } | {
-        end
-        for c in model.scene.chain
-        for body, end in (split_reference(c.inboard),)
-        if body == name
-    }
+def _loaded_ends(model: CompiledScene, name: str) -> set[str]:
+    """Ends of a body that are the inboard end of a hinge or chain."""
+    inboard = [hinge.inboard for hinge in model.scene.hinge]
+    inboard += [chain.inboard for chain in model.scene.chain]
+    return {end for body, end in map(split_reference, inboard) if body == name}
 
 
-def _one(
-    body: ModalBody, t: Array, eta: Array, seen: ModelRange, loaded: set[str], reach: float
+def _body_prediction(
+    body: ModalBody, t: Array, eta: Array, model_range: ModelRange, loaded: set[str], reach: float
 ) -> ErrorPrediction:
+    """Error estimates for one body; eta are absolute modal coordinates (n, modes)."""
     by_shape, course = np.zeros(body.n), np.zeros(len(eta))
     for end, port in body.ports.items():
-        each = np.linalg.norm(port.phi, axis=0)
+        displacement_per_eta = np.linalg.norm(port.phi, axis=0)
         if end in loaded:
-            each = each + reach * np.linalg.norm(port.theta, axis=0)
-        moved = each * eta
-        by_shape = np.maximum(by_shape, moved.max(axis=0, initial=0.0))
-        course = np.maximum(course, moved.sum(axis=1))
+            displacement_per_eta += reach * np.linalg.norm(port.theta, axis=0)
+        displacements = displacement_per_eta * eta
+        by_shape = np.maximum(by_shape, displacements.max(axis=0, initial=0.0))
+        course = np.maximum(course, displacements.sum(axis=1))
     return ErrorPrediction(
         float(course.max(initial=0.0)), dict(zip(body.modes, by_shape.tolist(), strict=True)),
-        0.0 if seen.coupling is None else seen.coupling[0], seen.load_ratio, seen.slope,
-        seen.first_frequency, seen.spin_ratio, seen.tail,
+        0.0 if model_range.coupling is None else model_range.coupling[0], model_range.load_ratio,
+        model_range.slope, model_range.first_frequency, model_range.spin_ratio, model_range.tail,
         tuple(zip(t.tolist(), course.tolist(), strict=True)),
     )  # fmt: skip
 
 
 def predict_errors(result: Result | None, reach: float) -> tuple[dict[str, ErrorPrediction], str]:
-    """The evidence, and why there is none."""
+    """Error estimates by body from a run, and the reason why there are none, or ""."""
     if result is None or not result.is_comparable:
         return {}, "" if result is None else result.message
     try:
-        return evidence_of(result, reach), ""
+        return body_predictions(result, reach), ""
     except (MstmmError, np.linalg.LinAlgError) as problem:
         return {}, str(problem)

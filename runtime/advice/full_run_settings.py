@@ -1,7 +1,7 @@
-"""Method and tolerance over the whole run where models are compared over a window of it.
+"""Tolerance over the whole run where models are compared only over a window of it.
 
-Errors of an integration do not grow with the time as those of a model do.  The reduced model is
-cheap: its setting is judged by a run of its own at a tighter tolerance, from beginning to end.
+Integration errors do not grow with time as model errors do.  The reduced model is cheap: its
+tolerance is verified by a tighter run over the whole time.
 """
 
 from __future__ import annotations
@@ -20,38 +20,44 @@ from .trial_models import TrialResult
 if TYPE_CHECKING:
     from .advice_state import AdviceState
 
-#: What is left of the budget, and no less than this part of all of it, may be taken.
-_SECONDS = 0.3
+#: Smallest fraction of the budget for this search, whatever remains of the budget.
+_MIN_BUDGET = 0.3
 
-#: The first tolerance in the error in parts of the motion, and the tightest; by how much a setting
-#: is tighter that judges another; what a next one aims at; most settings.
-_FIRST, _TIGHTEST, _BESIDE, _AIM, _MOST = 0.1, 1e-12, 1e-2, 0.3, 6
+#: First tolerance relative to the relative target error, and tightest tolerance; ratio of the
+#: tolerance of the verification; error that the next tolerance aims at, as a fraction of the
+#: allowed error; largest number of tolerances.
+_FIRST, _TIGHTEST, _VERIFICATION_RATIO, _AIM, _MAX_TRIALS = 0.1, 1e-12, 1e-2, 0.3, 6
 
 
 def whole_run_tolerance(
-    best: TrialResult, work: AdviceState, left: float
+    best: TrialResult, state: AdviceState, allowed_error: float
 ) -> SelectedSetting | None:
-    """A tolerance of `auto` that errs by at most `left` over the whole run; None where none was
-    found in time."""
-    span, measure = work.bench.span, work.measure
-    budget = Budget(max(_SECONDS * work.asked.budget, work.budget.left()), work.budget.clock)
-    times = np.linspace(0.0, span.wanted, work.asked.samples)
+    """Tolerance of method "auto" whose error over the whole run is at most `allowed_error`.
+
+    None if none is found in time.
+    """
+    span, measure = state.bench.span, state.measure
+    budget = Budget(max(_MIN_BUDGET * state.asked.budget, state.budget.left()), state.budget.clock)
+    times = np.linspace(0.0, span.wanted, state.asked.samples)
     runs = Runs(span.wanted, times, budget)
-    rtol = min(max(_FIRST * work.part, _TIGHTEST / _BESIDE), 1e-3)
-    for _ in range(_MOST):
+    rtol = min(max(_FIRST * state.part, _TIGHTEST / _VERIFICATION_RATIO), 1e-3)
+    for _ in range(_MAX_TRIALS):
         setting = Setting(AUTO, best.name, rtol)
-        beside = Setting(AUTO, best.name, rtol * _BESIDE)
+        tighter = Setting(AUTO, best.name, rtol * _VERIFICATION_RATIO)
         trial = runs.trial(best.running, setting, measure, budget.left() / 3)
-        judge = runs.trial(best.running, beside, measure, budget.left() / 2)
-        if trial.numbers is None or judge.numbers is None:
+        verification = runs.trial(best.running, tighter, measure, budget.left() / 2)
+        if trial.numbers is None or verification.numbers is None:
             return None
-        error = max_error(trial, judge, measure)
+        error = max_error(trial, verification, measure)
         if isinstance(error, str):
             return None
-        if error <= left:
-            own = (best.error + error) / span.growth
-            return SelectedSetting(best, Point(setting, own, trial.cpu_s, 1), whole=True)
-        if rtol <= _TIGHTEST / _BESIDE:
+        if error <= allowed_error:
+            total_error = (best.error + error) / span.growth
+            return SelectedSetting(best, Point(setting, total_error, trial.cpu_s, 1), whole=True)
+        if rtol <= _TIGHTEST / _VERIFICATION_RATIO:
             return None
-        rtol = max(rtol * min(max(_AIM * left / error, 1e-4), 0.1), _TIGHTEST / _BESIDE)
+        rtol = max(
+            rtol * min(max(_AIM * allowed_error / error, 1e-4), 0.1),
+            _TIGHTEST / _VERIFICATION_RATIO,
+        )
     return None

@@ -1,4 +1,4 @@
-"""Hinges that may be rigid, and springs that may be left out, by what they did in a run."""
+"""Hinges that may be made rigid, and springs that may be omitted, by their motion in a run."""
 
 from __future__ import annotations
 
@@ -17,31 +17,36 @@ from mstmm.scene.tables.hinge import HingeTable
 from mstmm.scene.tables.law import Law
 
 from ..chart.model_levels import with_tables
-from .scene_edits.chain_expansion import ExpandedScene, expand_chains, members, short
+from .scene_edits.chain_expansion import (
+    ExpandedScene,
+    chain_members,
+    expand_chains,
+    expandable_chains,
+)
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
 
 T = TypeVar("T", bound=HingeTable)
 
-#: Coordinates nearer to zero than this part of the scene's length count as zero.
-_AT_REST = 1e-9
+#: Coordinates below this fraction of the scene length count as zero.
+_ZERO_TOLERANCE = 1e-9
 
-#: The keys of a law that are left out together.
+#: Keys of a hinge law that are omitted together.
 _PASSIVE = ("stiffness", "rest", "damping", "friction")
 
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that may be done to a scene.
+    """Possible change of a hinge, chain or spring of a scene.
 
     Attributes:
-        what: hinge, chain or spring, with its name.
-        words: what is done, and the figures that speak for it.
-        expected: m, how far it may displace what is fixed there; 0 where nothing is known.
-        name: of what is changed; of a chain's member the one that it gets.
-        made: the new hinge or chain, None for a spring that is left out.
-        parts: what may be done where this is too much.
+        what: kind and name of the changed element.
+        words: description of the change, with numbers.
+        expected: estimated displacement of the attached bodies, m; 0 if unknown.
+        name: name of the changed element; of a member of a chain, its name in the expanded chain.
+        made: new hinge or chain, None for an omitted spring.
+        parts: smaller changes to try if the error of this one is too large.
     """
 
     what: str
@@ -56,172 +61,208 @@ class Change:
 
 
 def apply_changes(scene: Scene, changes: Sequence[Change]) -> ExpandedScene:
-    """The scene with these changes; chains of which members are changed are written out."""
-    made = {one.name: one.made for one in changes if isinstance(one.made, Hinge)}
-    chains = {one.name: one.made for one in changes if isinstance(one.made, Chain)}
-    springs = {one.name for one in changes if one.made is None}
-    whole = with_tables(
+    """The scene with these changes; chains with changed members are expanded."""
+    new_hinges = {change.name: change.made for change in changes if isinstance(change.made, Hinge)}
+    new_chains = {change.name: change.made for change in changes if isinstance(change.made, Chain)}
+    omitted_springs = {change.name for change in changes if change.made is None}
+    changed = with_tables(
         scene,
-        chain=tuple(chains.get(one.name, one) for one in scene.chain),
-        spring=tuple(one for one in scene.spring if one.name not in springs),
+        chain=tuple(new_chains.get(chain.name, chain) for chain in scene.chain),
+        spring=tuple(spring for spring in scene.spring if spring.name not in omitted_springs),
     )
-    touched = [
-        chain for chain in short(whole) if any(m.new_hinge in made for m in members(whole, chain))
+    changed_chains = [
+        chain
+        for chain in expandable_chains(changed)
+        if any(member.new_hinge in new_hinges for member in chain_members(changed, chain))
     ]
-    found = expand_chains(whole, touched)
-    hinges = tuple(made.get(one.name, one) for one in found.scene.hinge)
-    return replace(found, scene=with_tables(found.scene, hinge=hinges))
+    expanded = expand_chains(changed, changed_chains)
+    hinges = tuple(new_hinges.get(hinge.name, hinge) for hinge in expanded.scene.hinge)
+    return replace(expanded, scene=with_tables(expanded.scene, hinge=hinges))
 
 
 def _hinges(scene: Scene) -> Iterator[tuple[str, Hinge]]:
-    """Every hinge with the name that it has in the scene; members of chains as they are written
-    out."""
+    """All hinges with their names in the scene; those of chains as in the expanded chain."""
     yield from ((hinge.name, hinge) for hinge in scene.hinge)
-    chains = short(scene)
-    written = expand_chains(scene, chains).scene.hinge
-    known = {one.name: one for one in written[len(scene.hinge) :]}
+    chains = expandable_chains(scene)
+    expanded_hinges = expand_chains(scene, chains).scene.hinge[len(scene.hinge) :]
+    by_name = {hinge.name: hinge for hinge in expanded_hinges}
     for chain in chains:
-        yield from ((one.hinge, known[one.new_hinge]) for one in members(scene, chain))
+        for member in chain_members(scene, chain):
+            yield member.hinge, by_name[member.new_hinge]
 
 
-# --- rigid ----------------------------------------------------------------------------------------
+# --- rigid hinges -------------------------------------------------------------------------------
 
 
-def rigid(scene: Scene, model: CompiledScene, q: Array, reach: float) -> list[Change]:
-    """Hinges made rigid where they stood in a run of `model`, whose coordinates are q (n, nq);
-    least motion first.  `reach` (m) is how far a rotation of 1 rad displaces what is behind it.
+def rigid_hinge_changes(scene: Scene, model: CompiledScene, q: Array, reach: float) -> list[Change]:
+    """Changes that make a hinge rigid, by increasing motion of the hinge in a run of `model`.
+
+    q (n, nq) are the coordinates of the run; `reach` (m) is the displacement of the outboard bodies
+    per rad of rotation.
     """
-    found: list[Change] = []
+    changes: list[Change] = []
     released = {event.hinge for event in scene.event}
     for name, hinge in _hinges(scene):
-        known = model.scene.hinges.by_name.get(name)
-        facts = hinge.builtin
-        if facts is None or facts.welds or known is None or known.type != hinge.type:
+        simulated = model.scene.hinges.by_name.get(name)
+        properties = hinge.builtin
+        if properties is None or properties.welds:
+            continue
+        if simulated is None or simulated.type != hinge.type:
             continue
         if hinge.drive is not None or hinge.lets_go or name in released:
             continue
-        own = q[:, model.layout.hinges[name].q_slice]
-        change = _turned(hinge, own, reach) if facts.quaternion is not None else None
-        if facts.quaternion is None and facts.straight:
-            change = _straight(hinge, own, reach)
+        hinge_q = q[:, model.layout.hinges[name].q_slice]
+        change = None
+        if properties.quaternion is not None:
+            change = _rigid_at_reference_position(hinge, hinge_q, reach)
+        elif properties.straight:
+            change = _rigid_at_mean_position(hinge, hinge_q, reach)
         if change is not None:
-            found.append(replace(change, what=f'hinge "{name}"'))
-    return sorted(found, key=lambda one: one.expected)
+            changes.append(replace(change, what=f'hinge "{name}"'))
+    return sorted(changes, key=lambda change: change.expected)
 
 
-def _straight(hinge: Hinge, own: Array, reach: float) -> Change:
-    """A hinge without quaternion, at the middle of what its coordinates went through."""
-    facts = hinge.builtin
-    assert facts is not None
-    low, high = own.min(axis=0), own.max(axis=0)
-    middle, half = (low + high) / 2, (high - low) / 2
-    arms = [reach if one.unit == "rad" else 1.0 for one in facts.coordinates]
-    expected = float(np.max(half * arms, initial=0.0))
-    places = ", ".join(
-        f"{one.name} {value:.3g} {one.unit}"
-        for one, value in zip(facts.coordinates, middle, strict=True)
+def _rigid_at_mean_position(hinge: Hinge, hinge_q: Array, reach: float) -> Change:
+    """Make a hinge without quaternion rigid at the middle of the range of its coordinates."""
+    properties = hinge.builtin
+    assert properties is not None
+    low, high = hinge_q.min(axis=0), hinge_q.max(axis=0)
+    middle, half_range = (low + high) / 2, (high - low) / 2
+    lever_arms = [
+        reach if coordinate.unit == "rad" else 1.0 for coordinate in properties.coordinates
+    ]
+    expected = float(np.max(half_range * lever_arms, initial=0.0))
+    position = ", ".join(
+        f"{coordinate.name} {value:.3g} {coordinate.unit}"
+        for coordinate, value in zip(properties.coordinates, middle, strict=True)
     )
-    words = f"rigid at {places}, from which it moves by {np.max(half, initial=0.0):.1e} at most"
-    if facts.in_place and not np.any(np.abs(middle) * arms > _AT_REST * reach):
-        made = _weld(hinge, to_quaternion(hinge.rotation))
-    elif facts.axial and facts.turns and not facts.slides:
-        turned = product(hinge.rotation, rotation_about(hinge.unit_axis, float(middle[0])))
-        made = _weld(hinge, to_quaternion(turned))
+    words = f"rigid at {position}, largest motion {np.max(half_range, initial=0.0):.1e}"
+    if properties.in_place and not np.any(np.abs(middle) * lever_arms > _ZERO_TOLERANCE * reach):
+        rigid = _weld_hinge(hinge, to_quaternion(hinge.rotation))
+    elif properties.axial and properties.turns and not properties.slides:
+        rotation = product(hinge.rotation, rotation_about(hinge.unit_axis, float(middle[0])))
+        rigid = _weld_hinge(hinge, to_quaternion(rotation))
     else:
         drive = tuple(number(float(value)) for value in middle)
-        made = hinge.model_copy(update={"drive": drive, "initial": None, "law": _nothing(hinge)})
-    return Change(f'hinge "{hinge.name}"', words, expected, hinge.name, made)
+        rigid = hinge.model_copy(update={"drive": drive, "initial": None, "law": _zero_law(hinge)})
+    return Change(f'hinge "{hinge.name}"', words, expected, hinge.name, rigid)
 
 
-def _turned(hinge: Hinge, own: Array, reach: float) -> Change | None:
-    """A hinge with a quaternion that stays near to where both of its ends are one."""
-    facts = hinge.builtin
-    assert facts is not None
-    if facts.quaternion is None or len(facts.slides) not in (0, 3) or facts.frame != "own":
+def _rigid_at_reference_position(hinge: Hinge, hinge_q: Array, reach: float) -> Change | None:
+    """Make a hinge with a quaternion rigid where its two ends coincide; None if not possible."""
+    properties = hinge.builtin
+    assert properties is not None
+    if properties.quaternion is None or len(properties.slides) not in (0, 3):
         return None
-    vector = own[:, facts.quaternion + 1 : facts.quaternion + 4]
+    if properties.frame != "own":
+        return None
+    vector = hinge_q[:, properties.quaternion + 1 : properties.quaternion + 4]
     angle = 2 * float(np.arcsin(np.clip(np.linalg.norm(vector, axis=1), 0, 1)).max(initial=0.0))
-    far = float(np.linalg.norm(own[:, : facts.quaternion], axis=1).max(initial=0.0))
-    words = f"rigid, for it moves by {far:.1e} m and {angle:.1e} rad"
-    made = _weld(hinge, to_quaternion(hinge.rotation))
-    return Change(f'hinge "{hinge.name}"', words, far + reach * angle, hinge.name, made)
+    distances = np.linalg.norm(hinge_q[:, : properties.quaternion], axis=1)
+    distance = float(distances.max(initial=0.0))
+    words = f"rigid, largest motion {distance:.1e} m and {angle:.1e} rad"
+    rigid = _weld_hinge(hinge, to_quaternion(hinge.rotation))
+    return Change(f'hinge "{hinge.name}"', words, distance + reach * angle, hinge.name, rigid)
 
 
-def _weld(hinge: Hinge, orientation: Sequence[float]) -> Hinge:
-    """A fixed hinge at the same place."""
-    kind = next(name for name, facts in builtin_hinges().items() if facts.welds)
+def _weld_hinge(hinge: Hinge, orientation: Sequence[float]) -> Hinge:
+    """Weld that replaces a hinge, with this orientation (quaternion)."""
+    weld_type = next(name for name, properties in builtin_hinges().items() if properties.welds)
     return Hinge(
-        name=hinge.name, type=kind, inboard=hinge.inboard, outboard=hinge.outboard,
+        name=hinge.name, type=weld_type, inboard=hinge.inboard, outboard=hinge.outboard,
         orientation=tuple(orientation), position=hinge.position,
     )  # fmt: skip
 
 
-# --- left out -------------------------------------------------------------------------------------
+# --- omitted springs, dampers and friction ------------------------------------------------------
 
 
-def needless(scene: Scene) -> list[Change]:
-    """Springs, dampers and friction of hinges, and springs between bodies, each left out; of a
-    chain those of all its hinges, or of each."""
-    rows = {chain.name: [one.hinge for one in members(scene, chain)] for chain in short(scene)}
-    of_chains = {name for row in rows.values() for name in row}
-    found = {
+def omission_changes(scene: Scene) -> list[Change]:
+    """Changes that omit springs, dampers and friction of a hinge or chain, or a spring element.
+
+    In a chain they are omitted from all hinges together, or else from single hinges.
+    """
+    hinges_of_chains = {
+        chain.name: [member.hinge for member in chain_members(scene, chain)]
+        for chain in expandable_chains(scene)
+    }
+    chain_hinges = {name for names in hinges_of_chains.values() for name in names}
+    change_by_hinge = {
         name: Change(
-            f'hinge "{name}"', _without(_acting(hinge.law)), 0.0, hinge.name, _slack(hinge)
+            f'hinge "{name}"',
+            _omission_text(_passive_law_names(hinge.law)),
+            0.0,
+            hinge.name,
+            _without_passive_law(hinge),
         )
         for name, hinge in _hinges(scene)
-        if _acts(hinge)
+        if _has_passive_law(hinge)
     }
-    changes = [one for name, one in found.items() if name not in of_chains]
+    changes = [change for name, change in change_by_hinge.items() if name not in chain_hinges]
     for chain in scene.chain:
-        if any(_acts(one) for one in chain.hinge):
-            made = chain.model_copy(
-                update={"hinge": tuple(_slack(h) if _acts(h) else h for h in chain.hinge)}
+        if any(_has_passive_law(hinge) for hinge in chain.hinge):
+            hinges = tuple(
+                _without_passive_law(hinge) if _has_passive_law(hinge) else hinge
+                for hinge in chain.hinge
             )
-            acting = dict.fromkeys(word for hinge in chain.hinge for word in _acting(hinge.law))
-            words = _without(acting)
-            parts = [found[name] for name in rows.get(chain.name, ()) if name in found]
+            omitted = dict.fromkeys(
+                name for hinge in chain.hinge for name in _passive_law_names(hinge.law)
+            )
+            parts = tuple(
+                change_by_hinge[name]
+                for name in hinges_of_chains.get(chain.name, ())
+                if name in change_by_hinge
+            )
             changes.append(
-                Change(f'chain "{chain.name}"', words, 0.0, chain.name, made, tuple(parts))
+                Change(
+                    f'chain "{chain.name}"',
+                    _omission_text(omitted),
+                    0.0,
+                    chain.name,
+                    chain.model_copy(update={"hinge": hinges}),
+                    parts,
+                )
             )
     changes += [
-        Change(f'spring "{one.name}"', "left out, for it hardly matters", 0.0, one.name)
-        for one in scene.spring
+        Change(f'spring "{spring.name}"', "left out, negligible effect", 0.0, spring.name)
+        for spring in scene.spring
     ]
     return changes
 
 
-def _slack(hinge: T) -> T:
+def _without_passive_law(hinge: T) -> T:
     """A hinge without springs, dampers and friction."""
-    update = {key: getattr(_nothing(hinge), key) for key in _PASSIVE}
+    update = {key: getattr(_zero_law(hinge), key) for key in _PASSIVE}
     return hinge.model_copy(update={"law": hinge.law.model_copy(update=update)})
 
 
-def _without(acting: Iterable[str]) -> str:
-    return f"without its {' and '.join(acting)}, which hardly matters"
+def _omission_text(names: Iterable[str]) -> str:
+    return f"without its {' and '.join(names)}, negligible effect"
 
 
-def _acts(hinge: HingeTable) -> bool:
+def _has_passive_law(hinge: HingeTable) -> bool:
+    """Whether a built-in hinge that is not prescribed has springs, dampers or friction."""
     return (
         hinge.builtin is not None
         and hinge.drive is None
-        and next(_acting(hinge.law), None) is not None
+        and next(_passive_law_names(hinge.law), None) is not None
     )
 
 
-def _acting(law: Law) -> Iterator[str]:
+def _passive_law_names(law: Law) -> Iterator[str]:
     if any(law.stiffness):
         yield "spring"
     if any(law.damping):
         yield "damper"
-    if any(one.acts for one in law.friction):
+    if any(friction.acts for friction in law.friction):
         yield "friction"
 
 
-def _nothing(hinge: HingeTable) -> Law:
-    """A law that does nothing, with as many entries as the hinge has speeds."""
-    facts = hinge.builtin
-    assert facts is not None
-    neutral, count = Law().entry(0), len(facts.speeds)
+def _zero_law(hinge: HingeTable) -> Law:
+    """A law without any effort, with as many entries as the hinge has speeds."""
+    properties = hinge.builtin
+    assert properties is not None
+    neutral, count = Law().entry(0), len(properties.speeds)
     return Law().model_copy(
         update={key: (getattr(neutral, key),) * count for key in Law.model_fields}
     )

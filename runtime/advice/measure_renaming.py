@@ -1,4 +1,4 @@
-"""Measures of models in which places have other names."""
+"""Error measures of models in which bodies and ends have other names."""
 
 from __future__ import annotations
 
@@ -19,27 +19,29 @@ if TYPE_CHECKING:
 
 
 def rename_reference(name: str, names: Mapping[str, str]) -> str:
-    """A place, or a quantity of one ("arm.tip.position"), by its new name."""
+    """New name of a body or end, or of its quantity such as "arm.tip.position"."""
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
-        place = ".".join(parts[:count])
-        if place in names:
-            return ".".join([names[place], *parts[count:]])
+        reference = ".".join(parts[:count])
+        if reference in names:
+            return ".".join([names[reference], *parts[count:]])
     return name
 
 
 def compose_names(first: Mapping[str, str], second: Mapping[str, str]) -> dict[str, str]:
-    """Names after one change of them and then another."""
+    """Names after two successive renamings: former name -> last name."""
     return {**second, **{old: rename_reference(new, second) for old, new in first.items()}}
 
 
 class Renaming(Measure):
-    """A measure that reads models with other names as if they had the former ones."""
+    """Error measure that reads results of renamed models by the former names."""
 
     def __init__(self, inner: Measure) -> None:
         self.inner = inner
         self.name, self.unit, self.scaling = inner.name, inner.unit, inner.scaling
-        self._known: dict[int, tuple[CompiledScene, Mapping[str, str], Mapping[str, Vector]]] = {}
+        self._renamings: dict[
+            int, tuple[CompiledScene, Mapping[str, str], Mapping[str, Vector]]
+        ] = {}
 
     def know(
         self,
@@ -47,31 +49,31 @@ class Renaming(Measure):
         names: Mapping[str, str],
         still: Mapping[str, Vector] | None = None,
     ) -> None:
-        """Former name of a place -> its name in a model, and -> where it is if it stands still."""
-        self._known[id(model)] = (model, names, still or {})
+        """Register the names of a model: former name -> new name, or -> fixed position (3,), m."""
+        self._renamings[id(model)] = (model, names, still or {})
 
     def names_in(self, model: CompiledScene) -> Mapping[str, str]:
-        """Former name -> its name in a model."""
-        return self._known[id(model)][1] if id(model) in self._known else {}
+        """Names of a model: former name -> new name."""
+        return self._renamings[id(model)][1] if id(model) in self._renamings else {}
 
     def read(self, result: Record) -> Array:
-        """(n, k) numbers of a run at its samples."""
-        if id(result.model) not in self._known:
+        """Measured values (n, k) of a run at its samples."""
+        if id(result.model) not in self._renamings:
             return self.inner.read(result)
-        _, names, still = self._known[id(result.model)]
-        return self.inner.read(cast("Record", _ByFormerNames(result, names, still)))
+        _, names, still = self._renamings[id(result.model)]
+        return self.inner.read(cast("Record", _RenamedRecord(result, names, still)))
 
     def apart(self, a: Array, b: Array) -> Array:
-        """(n,) distances of two of them."""
+        """Distances (n,) between two sets of measured values."""
         return self.inner.apart(a, b)
 
     def scale_by(self, numbers: Array) -> None:
-        """Take the sizes of what is compared from the reference."""
+        """Scale relative errors by the measured values of the reference."""
         self.inner.scale_by(numbers)
 
 
-class _ByFormerNames:
-    """What a measure asks of a result, by the former names."""
+class _RenamedRecord:
+    """Positions and quantities of a result, by the former names."""
 
     def __init__(
         self, result: Record, names: Mapping[str, str], still: Mapping[str, Vector]

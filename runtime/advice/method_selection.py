@@ -1,4 +1,4 @@
-"""Method and tolerance of a model: what a wanted error leads to, or what is cheaper."""
+"""Select method and tolerance: the cheapest setting that meets a target error."""
 
 from __future__ import annotations
 
@@ -18,86 +18,99 @@ from ..chart.trial_run import Runs
 from .measure_renaming import rename_reference
 from .trial_models import TrialResult, TrialRunner
 
-#: What is left of the error asked beside the model's own: this part of it is wanted of the
-#: integration, and where an error is down to this part of what is asked, tighter settings show
-#: nothing more.
-_WANTED, _ENOUGH = 0.5, 0.3
+#: Target error of the integration as a fraction of the error that the model leaves; and fraction of
+#: the target error below which tighter settings are not tried.
+_INTEGRATION_ERROR, _SUFFICIENT_ERROR = 0.5, 0.3
 
-#: Settings whose times are taken again; a model counts as quick as another up to so many times its
-#: time, for times scatter.
-_AGAIN, _AS_QUICK = 8, 1.15
+#: Number of settings whose timing is repeated; models count as equally fast up to this ratio of CPU
+#: times, because timings scatter.
+_REPEATED, _EQUAL_TIME_RATIO = 8, 1.15
 
 
 @dataclass(frozen=True)
 class SelectedSetting:
-    """A setting of a model: its point holds error and processor time over the span; those of the
-    integration over the `whole` run, where that is more."""
+    """Setting of a model, with its error and CPU time in `point`.
+
+    They refer to the compared time span; with `whole` the integration was checked over the whole
+    run.
+    """
 
     tried: TrialResult
     point: Point
     whole: bool = False
 
 
-def cheapest(
+def cheapest_setting(
     finalists: list[TrialResult],
     bench: TrialRunner,
-    asked: float,
+    target_error: float,
     of: tuple[str, ...],
     rounds: int,
     seconds: float,
 ) -> SelectedSetting:
-    """The cheapest setting of any of these models that errs by at most `asked` over the span; the
-    first of them is the smallest.
+    """Cheapest setting of any of these models with an error of at most `target_error`.
 
-    `seconds` of the clock may be taken.  Raises NumericalFailure where no setting does.
+    The first model is the smallest.  `seconds` limits the wall-clock time.  Raises NumericalFailure
+    if no setting reaches the error.
     """
     budget = Budget(seconds, bench.budget.clock)
     runs = Runs(bench.span.t_end, np.array(bench.runs.times), budget)
     survey = Survey(bench.reference, bench.measure, runs, bench.tell)
     reference = Reference(0.0, "", "", bench.measure.name, bench.measure.unit, "")
-    own = {one.name: one.error / bench.span.growth for one in finalists}
+    model_errors = {tried.name: tried.error / bench.span.growth for tried in finalists}
     curves = []
-    for one in finalists:
-        model, enough = one.running, _ENOUGH * asked
+    for tried in finalists:
+        model, enough = tried.running, _SUFFICIENT_ERROR * target_error
         names = bench.measure.names_in(model)
-        theirs = tuple(rename_reference(name, names) for name in of)
-        found = _wanted(one, runs, theirs, _WANTED * (asked - own[one.name]))
-        if found is not None:
-            curves.append(Curve(found.method, one.name, model, enough, "", iter((found,))))
+        quantities = tuple(rename_reference(name, names) for name in of)
+        model_error = model_errors[tried.name]
+        setting = _setting_for_error(
+            tried, runs, quantities, _INTEGRATION_ERROR * (target_error - model_error)
+        )
+        if setting is not None:
+            curves.append(Curve(setting.method, tried.name, model, enough, "", iter((setting,))))
         curves += [
-            method_curve(method, one.name, model, bench.span.t_end, enough, own[one.name])
+            method_curve(method, tried.name, model, bench.span.t_end, enough, model_error)
             for method in PROMISING
         ]
-    found_all = survey.make(curves, EARLY)
-    points = bound_errors(found_all.points, reference)
-    good = [i for i, p in enumerate(points) if p.sure_error is not None and p.sure_error <= asked]
-    if not good:
-        raise NumericalFailure(f"none of the methods that were tried errs by at most {asked:.1e}")
-    few = sorted(good, key=lambda i: points[i].cpu_s or 0.0)
-    few = [*few[:_AGAIN], *(i for i in few[_AGAIN:] if points[i].model == finalists[0].name)]
-    few = few[: 2 * _AGAIN]
-    models = [found_all.models[i] for i in few]
-    again, _ = repeat_timings([points[i] for i in few], models, rounds, runs, bench.tell)
-    best = recommend(again, asked, reference)
-    own_ones = [point for point in again if point.model == finalists[0].name]
-    if own_ones:  # the smallest model counts where it is no slower
-        smallest = recommend(own_ones, asked, reference)
-        if (smallest.cpu_s or 0.0) <= _AS_QUICK * (best.cpu_s or 0.0):
+    surveyed = survey.make(curves, EARLY)
+    points = bound_errors(surveyed.points, reference)
+    sufficient = [
+        i
+        for i, point in enumerate(points)
+        if point.sure_error is not None and point.sure_error <= target_error
+    ]
+    if not sufficient:
+        raise NumericalFailure(f"no setting reaches an error of {target_error:.1e}")
+    smallest_name = finalists[0].name
+    order = sorted(sufficient, key=lambda i: points[i].cpu_s or 0.0)
+    fastest, others = order[:_REPEATED], order[_REPEATED:]
+    repeated = [*fastest, *(i for i in others if points[i].model == smallest_name)]
+    repeated = repeated[: 2 * _REPEATED]
+    models = [surveyed.models[i] for i in repeated]
+    timed, _ = repeat_timings([points[i] for i in repeated], models, rounds, runs, bench.tell)
+    best = recommend(timed, target_error, reference)
+    of_smallest = [point for point in timed if point.model == smallest_name]
+    if of_smallest:  # prefer the smallest model unless it is slower
+        smallest = recommend(of_smallest, target_error, reference)
+        if (smallest.cpu_s or 0.0) <= _EQUAL_TIME_RATIO * (best.cpu_s or 0.0):
             best = smallest
-    return SelectedSetting(next(one for one in finalists if one.name == best.model), best)
+    return SelectedSetting(next(tried for tried in finalists if tried.name == best.model), best)
 
 
-def _wanted(one: TrialResult, runs: Runs, of: tuple[str, ...], error: float) -> Setting | None:
-    """The setting to which an error of the integration alone leads; None where it leads to none."""
+def _setting_for_error(
+    tried: TrialResult, runs: Runs, of: tuple[str, ...], error: float
+) -> Setting | None:
+    """Setting that `simulate` selects for an integration error; None if it fails."""
     try:
         options = {"error": error, "error_of": of}
-        result, _ = runs.called(one.running, options, runs.budget.share(ALL))
+        result, _ = runs.called(tried.running, options, runs.budget.share(ALL))
     except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
         return None
-    known = result.error_estimate
-    if known is None or not result.is_comparable:
+    estimate = result.error_estimate
+    if estimate is None or not result.is_comparable:
         return None
-    return Setting(known.method, one.name, known.rtol)
+    return Setting(estimate.method, tried.name, estimate.rtol)
 
 
 def compare_cpu_times(
@@ -108,14 +121,13 @@ def compare_cpu_times(
     bench: TrialRunner,
     rounds: int,
 ) -> tuple[float, float] | None:
-    """Processor times of two runs in alternating rounds, s; None where one fails or takes too
-    long."""
+    """CPU times of two runs in alternating rounds, s; None if one fails or takes too long."""
     points, models = [], [a.running, b.running]
-    for model, one in zip(models, (setting, other), strict=True):
-        trial = bench.runs.trial(model, one, bench.measure, bench.budget.left() / 2)
+    for model, model_setting in zip(models, (setting, other), strict=True):
+        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.left() / 2)
         if trial.numbers is None:
             return None
-        points.append(Point(one, 0.0, trial.cpu_s, 1))
+        points.append(Point(model_setting, 0.0, trial.cpu_s, 1))
     timed, _ = repeat_timings(points, models, rounds, bench.runs, bench.tell)
     first, second = (point.cpu_s or 0.0 for point in timed)
     return first, second

@@ -1,4 +1,4 @@
-"""Outputs of a scene in its reduced ones: only those there are."""
+"""Outputs of a reduced scene."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ if TYPE_CHECKING:
     from ..model.model import Model
 
 
-def with_outputs_there(scene: Scene, compile: Callable[[Scene], Model]) -> Scene:
-    """The scene without the outputs that its results would lack."""
+def with_available_outputs(scene: Scene, compile: Callable[[Scene], Model]) -> Scene:
+    """The scene without the outputs that its results cannot provide."""
     if not scene.output:
         return scene
-    there = compile(scene).simulate(0.0, "dop853").outputs()
-    return with_tables(scene, output=tuple(one for one in scene.output if one.name in there))
+    available = compile(scene).simulate(0.0, "dop853").outputs()
+    return with_tables(
+        scene, output=tuple(output for output in scene.output if output.name in available)
+    )

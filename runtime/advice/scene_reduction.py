@@ -1,5 +1,6 @@
-"""What is changed of a scene around the choices for its bodies: its plane, hinges, welded bodies;
-each change is run beside the reference before it counts.
+"""Reduce a scene apart from the levels of its bodies: plane, hinges, springs, welded bodies.
+
+Each change is compared with the reference in a run before it is used.
 """
 
 from __future__ import annotations
@@ -21,111 +22,121 @@ from .trial_models import TrialResult
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: The search for smaller models ends when this part of the budget is spent.
+#: Fraction of the budget after which the search for smaller models ends.
 SEARCH = 0.6
 
-#: A planar scene is the same motion: it may err by this part of what is asked.
-_SAME = 0.01
+#: Largest error of a planar scene, as a fraction of the target error: its motion must be the same.
+_PLANAR_ERROR = 0.01
 
-#: What is expected to err by so many times what suffices is not tried.
-_UNLIKELY = 5.0
+#: Changes with an estimated error above this many times the allowed one are not tried.
+_MAX_ESTIMATE = 5.0
 
 
-def in_plane(work: AdviceState, top: Variant, model: Model, richest: TrialResult) -> TrialResult:
-    """The richest scene in its plane where that is the same motion."""
-    flat = planar_level(top, model, work.bench.reference.q) if work.bench.span.whole else None
-    if flat is None:
+def reduce_to_plane(
+    state: AdviceState, top: Variant, model: Model, richest: TrialResult
+) -> TrialResult:
+    """The planar form of the richest scene, if its motion is the same; else the scene."""
+    if not state.bench.span.whole:
         return richest
-    found = work.bench.tried("planar", flat.scene)
-    if found.error > max(_SAME * work.asked.error, 3 * work.bench.floor):
+    planar = planar_level(top, model, state.bench.reference.q)
+    if planar is None:
+        return richest
+    tried = state.bench.tried("planar", planar.scene)
+    if tried.error > max(_PLANAR_ERROR * state.asked.error, 3 * state.bench.floor):
         return richest
     hinges = [
-        f'hinge "{old.name}": {new.type} instead of {old.type}, for the motion stays in a plane'
-        for old, new in zip(top.scene.hinge, flat.scene.hinge, strict=True)
+        f'hinge "{old.name}": {new.type} instead of {old.type}, because the motion is planar'
+        for old, new in zip(top.scene.hinge, planar.scene.hinge, strict=True)
         if old != new
     ]
-    work.told[found.name] = (*hinges, _measured("in its plane the scene", found, richest))
-    return found
+    state.told[tried.name] = (*hinges, _measured_text("planar scene", tried, richest))
+    return tried
 
 
 def reduce_by_halves(
-    work: AdviceState,
+    state: AdviceState,
     base: TrialResult,
     word: str,
     changes: list[Change],
-    enough: float,
+    max_error: float,
     cheap: bool,
 ) -> TrialResult:
-    """The model with as many of these changes as it bears within an error that is enough, and
-    within the time of the one before if they are to be `cheap`: all at once, else each half of
-    them, down to parts of one."""
-    if not work.bench.span.whole:
+    """Apply as many changes as the allowed error permits; with `cheap` none that adds CPU time.
+
+    All changes are tried together, then by halves, down to the parts of single changes.  `word`
+    describes the changes in names of models.
+    """
+    if not state.bench.span.whole:
         return base
-    names = work.measure.names_in(base.running)
+    names = state.measure.names_in(base.running)
     kept: list[Change] = []
-    best, words = base, tuple[str, ...]()
-    waiting = [[one for one in changes if one.expected * work.in_measure <= _UNLIKELY * enough]]
-    told = work.told[base.name]
-    while waiting and work.budget.left(SEARCH):
-        more = waiting.pop()
-        if not more:
+    best, chain_sentences = base, tuple[str, ...]()
+    limit = _MAX_ESTIMATE * max_error
+    waiting = [[change for change in changes if change.expected * state.in_measure <= limit]]
+    sentences = state.told[base.name]
+    while waiting and state.budget.left(SEARCH):
+        group = waiting.pop()
+        if not group:
             continue
-        made = apply_changes(base.scene, [*kept, *more])
-        name = f"{base.name}; {word}: {', '.join(one.name for one in (*kept, *more))}"
-        found = work.bench.tried(name, made.scene, compose_names(names, made.names))
-        if found.error <= enough and (not cheap or work.bench.as_cheap(found, best)):
-            kept, best, words = [*kept, *more], found, made.words
-        elif len(more) > 1:
-            half = len(more) // 2
-            waiting += [more[half:], more[:half]]
+        changed = apply_changes(base.scene, [*kept, *group])
+        changed_names = ", ".join(change.name for change in (*kept, *group))
+        name = f"{base.name}; {word}: {changed_names}"
+        tried = state.bench.tried(name, changed.scene, compose_names(names, changed.names))
+        if tried.error <= max_error and (not cheap or state.bench.as_cheap(tried, best)):
+            kept, best, chain_sentences = [*kept, *group], tried, changed.words
+        elif len(group) > 1:
+            half = len(group) // 2
+            waiting += [group[half:], group[:half]]
         else:
-            waiting.append(list(more[0].parts))
-    work.skipped += [f"{word} {one.name}" for more in waiting for one in more]
+            waiting.append(list(group[0].parts))
+    state.skipped += [f"{word} {change.name}" for group in waiting for change in group]
     if kept:
-        alone = [_alone(work, base, word, one, names) for one in kept]
+        single = [_single_change_text(state, base, word, change, names) for change in kept]
         if len(kept) > 1:
-            alone.append(_measured(f"with these {len(kept)} changes the scene", best, base))
-        work.told[best.name] = (*told, *alone, *words)
+            single.append(_measured_text(f"with these {len(kept)} changes", best, base))
+        state.told[best.name] = (*sentences, *single, *chain_sentences)
     return best
 
 
-def _alone(
-    work: AdviceState, base: TrialResult, word: str, change: Change, names: Mapping[str, str]
+def _single_change_text(
+    state: AdviceState, base: TrialResult, word: str, change: Change, names: Mapping[str, str]
 ) -> str:
-    """What one change is, and what it does alone where there is time to see it."""
-    if not work.budget.left(SEARCH):
+    """Description of a change, with its effect alone if there is time for a run."""
+    if not state.budget.left(SEARCH):
         return str(change)
-    made = apply_changes(base.scene, [change])
-    found = work.bench.tried(
-        f"{base.name}; {word}: {change.name}", made.scene, compose_names(names, made.names)
+    changed = apply_changes(base.scene, [change])
+    tried = state.bench.tried(
+        f"{base.name}; {word}: {change.name}", changed.scene, compose_names(names, changed.names)
     )
-    return _measured(f"{change}; with that alone the scene", found, base)
+    return _measured_text(f"{change}; this change alone", tried, base)
 
 
-def _measured(words: str, found: TrialResult, before: TrialResult) -> str:
-    """The error of a model beside the richest, and its time beside that of the one before."""
-    if not math.isfinite(found.error):
-        return f"{words} does not run ({found.why})"
-    part = found.cpu_s / before.cpu_s
-    return f"{words} errs by {found.error:.1e} and takes {part:.2f} of the time before"
+def _measured_text(description: str, tried: TrialResult, before: TrialResult) -> str:
+    """Error of a model, and its CPU time relative to the model before a change."""
+    if not math.isfinite(tried.error):
+        return f"{description}: fails ({tried.why})"
+    ratio = tried.cpu_s / before.cpu_s
+    return f"{description}: error {tried.error:.1e}, {ratio:.2f} of the time before"
 
 
-def merge_welded(work: AdviceState, base: TrialResult, enough: float) -> TrialResult:
-    """The model with welded rigid bodies as one, and with the ground; where what is asked of is
-    gone then, with the bodies and hinges of that as they are."""
-    names_now = work.measure.names_in(base.running)
-    asked = {split_reference(rename_reference(name, names_now))[0] for name in work.asked.of}
-    for keep in [set(), asked] if asked else [set()]:
-        found = merge_welds(base.scene, keep)
-        if found is None:
+def merge_welded(state: AdviceState, base: TrialResult, max_error: float) -> TrialResult:
+    """Merge welded rigid bodies, and those welded to the ground, within the allowed error.
+
+    If the compared quantities are not available then, their bodies and hinges are kept.
+    """
+    names_now = state.measure.names_in(base.running)
+    compared = {split_reference(rename_reference(name, names_now))[0] for name in state.asked.of}
+    for keep in [set(), compared] if compared else [set()]:
+        merged = merge_welds(base.scene, keep)
+        if merged is None:
             return base
-        name = f"{base.name}; welded bodies as one" + (", but what is asked of" if keep else "")
-        names = compose_names(names_now, found.names)
-        still = dict(found.still)
+        name = f"{base.name}; welded bodies merged" + (", except compared ones" if keep else "")
+        names = compose_names(names_now, merged.names)
+        still = dict(merged.still)
         still |= {old: still[new] for old, new in names_now.items() if new in still}
-        tried = work.bench.tried(name, found.scene, names, still)
-        if tried.error <= enough:
-            one = _measured("with welded bodies as one the scene", tried, base)
-            work.told[name] = (*work.told[base.name], *found.words, one)
+        tried = state.bench.tried(name, merged.scene, names, still)
+        if tried.error <= max_error:
+            effect = _measured_text("with welded bodies merged", tried, base)
+            state.told[name] = (*state.told[base.name], *merged.words, effect)
             return tried
     return base

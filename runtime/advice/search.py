@@ -1,8 +1,8 @@
-"""From what is expected to the cheapest choices that were seen to suffice.
+"""Search for the cheapest sufficient models of the flexible bodies.
 
-Each body begins with the least choice that is expected to suffice.  Where the model made of them
-does not, the bodies of which most is expected get richer; where it does, each body is tried with
-less, until nothing less suffices.  The richest model always does.
+Each body starts with the smallest model that suffices by its error estimate.  If the scene does not
+suffice then, the bodies with the largest estimates get richer models; if it does, smaller models
+are tried for each body until none suffices.  The richest model always suffices.
 """
 
 from __future__ import annotations
@@ -15,22 +15,34 @@ from .body_model_levels import LINEAR, ONE_WAY, RIGID, STIFFENED, VIBRATION, Bod
 from .error_predictors import ErrorPrediction
 from .trial_models import TrialResult, TrialRunner
 
-#: A choice is expected to suffice below this part of what is asked, and is not tried where more
-#: than so many times of it is expected; a one-way response, which takes its time, than so many.
-_ENOUGH, _HOPELESS, _DOUBTFUL = 0.5, 50.0, 3.0
+#: A model is expected to suffice if its estimated error is below this fraction of the allowed one.
+_SUFFICIENT = 0.5
 
-#: Bodies get richer together where this part of the largest error is expected of them.
-_TOGETHER = 0.1
+#: A model is not tried if its estimated error is above this many times the allowed one; the second
+#: limit is for one-way coupling, which takes more time.
+_MAX_ESTIMATE, _MAX_ONE_WAY_ESTIMATE = 50.0, 3.0
+
+#: Bodies get richer models together if their estimates are above this fraction of the largest one.
+_JOINT_FRACTION = 0.1
 
 Choices = dict[str, BodyModel]
 
 
 @dataclass
 class ModelSearch:
-    """The search over one scene.
+    """Search over the models of the flexible bodies of one scene.
 
-    `enough` is the error that suffices, `in_measure` turns metres into the unit of errors;
-    `skipped` are the bodies of which less was not tried, as the time had ended.
+    Attributes:
+        bodies: the flexible bodies.
+        bench: runner of trial models.
+        evidence: error estimates by body.
+        enough: allowed error.
+        in_measure: factor from m to the unit of errors.
+        time_left: whether there is time for more trials.
+        failed: (body, model) that were tried without success.
+        made: name of a scene model -> its choices.
+        out_of_time: whether the time limit has been reached.
+        skipped: bodies whose smaller models were not tried for lack of time.
     """
 
     bodies: Bodies
@@ -45,161 +57,168 @@ class ModelSearch:
     skipped: list[str] = field(default_factory=list)
 
     def run(self) -> tuple[Choices, TrialResult]:
-        """The choices, and the model that was made of them."""
-        choices, tried = self._climb()
-        return self._descend(choices, tried)
+        """Run the search; return the models of the bodies and the trial of the scene."""
+        choices, tried = self._enlarge()
+        return self._reduce(choices, tried)
 
     def expected(self, name: str, choice: BodyModel) -> float | None:
-        """Error expected of a choice for one body, None where nothing is known."""
-        known = self.evidence.get(name)
-        return None if known is None else known.error(choice) * self.in_measure
+        """Estimated error of a model of one body; None without estimate."""
+        prediction = self.evidence.get(name)
+        return None if prediction is None else prediction.error(choice) * self.in_measure
 
     def tried(self, choices: Mapping[str, BodyModel]) -> TrialResult:
-        """The model with these choices."""
+        """Trial of the scene with these models of its bodies."""
         name = self.name(choices)
         self.made[name] = dict(choices)
         return self.bench.tried(name, self.bodies.scene_of(choices))
 
     def name(self, choices: Mapping[str, BodyModel]) -> str:
-        """A model in words; bodies with the same choice together."""
-        together: dict[str, list[str]] = {}
+        """Description of the scene; bodies with the same model are listed together."""
+        bodies_by_model: dict[str, list[str]] = {}
         for body, choice in choices.items():
-            together.setdefault(str(choice), []).append(body)
-        return "; ".join(f"{', '.join(names)}: {what}" for what, names in together.items())
+            bodies_by_model.setdefault(str(choice), []).append(body)
+        return "; ".join(
+            f"{', '.join(bodies)}: {model}" for model, bodies in bodies_by_model.items()
+        )
 
-    # --- up -------------------------------------------------------------------------------------
+    # --- richer models ------------------------------------------------------------------------
 
-    def _climb(self) -> tuple[Choices, TrialResult]:
-        choices = {name: self._first(name) for name in self.bodies.richest}
+    def _enlarge(self) -> tuple[Choices, TrialResult]:
+        """Make bodies richer until the scene suffices."""
+        choices = {name: self._initial_choice(name) for name in self.bodies.richest}
         while True:
             tried = self.tried(choices)
             if tried.error <= self.enough or choices == self.bodies.richest:
                 return choices, tried
-            if not self._more_time():
+            if not self._has_time():
                 self.skipped = list(choices)
                 return dict(self.bodies.richest), self.tried(self.bodies.richest)
             choices = self.richer(choices)
 
-    def _first(self, name: str) -> BodyModel:
-        """The least choice that is expected to suffice."""
-        part = _ENOUGH * self.enough / len(self.bodies.richest)
-        for choice in self._upward(name):
-            known = self.expected(name, choice)
-            if known is not None and known <= part and self._sound(name, choice):
+    def _initial_choice(self, name: str) -> BodyModel:
+        """The smallest model that is expected to suffice."""
+        limit = _SUFFICIENT * self.enough / len(self.bodies.richest)
+        for choice in self._choices_upward(name):
+            estimate = self.expected(name, choice)
+            if estimate is not None and estimate <= limit and self._is_valid(name, choice):
                 return choice
         return self.bodies.richest[name]
 
-    def _sound(self, name: str, choice: BodyModel) -> bool:
-        """Whether a level is used within its range: linear kinematics of a body that stiffens by
-        its loads may diverge, whatever it deflects."""
-        known = self.evidence.get(name)
-        return known is None or choice.level not in (ONE_WAY, LINEAR) or not known.stiffens
+    def _is_valid(self, name: str, choice: BodyModel) -> bool:
+        """Whether a level is valid: linear kinematics may diverge for a body stiffened by loads."""
+        prediction = self.evidence.get(name)
+        is_linear = choice.level in (ONE_WAY, LINEAR)
+        return prediction is None or not is_linear or not prediction.stiffens
 
-    def _upward(self, name: str) -> Iterator[BodyModel]:
-        """Choices from the least to the richest; shapes are added where they deflect most.
+    def _choices_upward(self, name: str) -> Iterator[BodyModel]:
+        """Models from the smallest to the richest; shapes with the largest deflection come first.
 
-        One-way responses are no step on the way: where they are cheaper shows when they are run.
+        One-way coupling is not included: only a run shows whether it is cheaper.
         """
         richest = self.bodies.richest[name]
         yield BodyModel(RIGID)
-        for shapes in self._shapes_upward(name):
+        for shapes in self._shape_counts_upward(name):
             yield BodyModel(LINEAR, shapes)
             if richest.level == STIFFENED:
                 yield BodyModel(STIFFENED, shapes)
 
-    def _shapes_upward(self, name: str) -> Iterator[tuple[tuple[str, int], ...]]:
+    def _shape_counts_upward(self, name: str) -> Iterator[tuple[tuple[str, int], ...]]:
         richest = self.bodies.richest[name]
         counts = dict(richest.shapes)
         if VIBRATION in counts:
             yield from (((VIBRATION, n),) for n in range(counts[VIBRATION] + 1))
             return
-        now = BodyModel(STIFFENED)
-        while now.shapes != richest.shapes:
-            have = dict(now.shapes)
-            open_ones = [word for word, most in counts.items() if have.get(word, 0) < most]
-            word = max(open_ones, key=lambda one: self._next_size(name, one, have.get(one, 0)))
-            now = now.with_count(word, have.get(word, 0) + 1)
-            yield now.shapes
+        model = BodyModel(STIFFENED)
+        while model.shapes != richest.shapes:
+            present = dict(model.shapes)
+            deflections = {
+                direction: self._next_shape_deflection(name, direction, present.get(direction, 0))
+                for direction, max_count in counts.items()
+                if present.get(direction, 0) < max_count
+            }
+            direction = max(deflections, key=lambda key: deflections[key])
+            model = model.with_count(direction, present.get(direction, 0) + 1)
+            yield model.shapes
 
-    def _next_size(self, name: str, direction: str, have: int) -> float:
-        """How much the next shape in a direction deflects; bending before twist and axial shapes
-        where nothing is known."""
-        known = self.evidence.get(name)
-        if known is None:
-            return -have - (0.5 if direction in ("twist", "axial") else 0.0)
-        return known.by_shape.get(f"{direction}{have + 1}", 0.0)
+    def _next_shape_deflection(self, name: str, direction: str, count: int) -> float:
+        """Deflection by the next shape after `count` shapes in a direction, m.
+
+        Without estimate a rank: few shapes first, bending before twist and axial shapes.
+        """
+        prediction = self.evidence.get(name)
+        if prediction is None:
+            return -count - (0.5 if direction in ("twist", "axial") else 0.0)
+        return prediction.by_shape.get(f"{direction}{count + 1}", 0.0)
 
     def richer(self, choices: Choices) -> Choices:
-        """The bodies of which most is expected, one choice up."""
-        rising = {name for name in choices if choices[name] != self.bodies.richest[name]}
-        known = {name: self.expected(name, choices[name]) for name in rising}
-        sizes = {name: math.inf if size is None else size for name, size in known.items()}
-        most = max(sizes.values())
-        raised = dict(choices)
-        for name, size in sizes.items():
-            if size >= _TOGETHER * most:
-                raised[name] = self._above(name, choices[name])
-        return raised
+        """Choices with richer models of the bodies with the largest estimated errors."""
+        candidates = {name for name in choices if choices[name] != self.bodies.richest[name]}
+        estimates = {name: self.expected(name, choices[name]) for name in candidates}
+        errors = {name: math.inf if error is None else error for name, error in estimates.items()}
+        max_error = max(errors.values())
+        richer = dict(choices)
+        for name, error in errors.items():
+            if error >= _JOINT_FRACTION * max_error:
+                richer[name] = self._next_choice(name, choices[name])
+        return richer
 
-    def _above(self, name: str, choice: BodyModel) -> BodyModel:
-        """The next choice of which less is expected; the richest where there is none."""
-        upward = list(self._upward(name))
-        now = self.expected(name, choice)
-        for other in upward[upward.index(choice) + 1 :] if choice in upward else ():
-            known = self.expected(name, other)
-            less = known is None or now is None or known < _ENOUGH * now
-            if less and self._sound(name, other):
-                return other
+    def _next_choice(self, name: str, choice: BodyModel) -> BodyModel:
+        """The next model with a smaller estimated error; the richest if there is none."""
+        models = list(self._choices_upward(name))
+        current = self.expected(name, choice)
+        for model in models[models.index(choice) + 1 :] if choice in models else ():
+            estimate = self.expected(name, model)
+            is_smaller = estimate is None or current is None or estimate < _SUFFICIENT * current
+            if is_smaller and self._is_valid(name, model):
+                return model
         return self.bodies.richest[name]
 
-    # --- down -----------------------------------------------------------------------------------
+    # --- smaller models -----------------------------------------------------------------------
 
-    def _descend(self, choices: Choices, best: TrialResult) -> tuple[Choices, TrialResult]:
-        """Less of each body, those with most shapes first, as long as it suffices and is no
-        dearer."""
+    def _reduce(self, choices: Choices, best: TrialResult) -> tuple[Choices, TrialResult]:
+        """Make bodies smaller, most shapes first, while the scene suffices and is not slower."""
         order = sorted(choices, key=lambda name: -choices[name].total)
         for k, name in enumerate(order):
-            lowered = True
-            while lowered:
-                lowered = False
-                for choice in self._less(name, choices[name]):
-                    if (name, choice) in self.failed or not self._worth_trying(name, choice):
+            is_reduced = True
+            while is_reduced:
+                is_reduced = False
+                for choice in self._smaller_choices(name, choices[name]):
+                    if (name, choice) in self.failed or not self._is_promising(name, choice):
                         continue
-                    if not self._more_time():
+                    if not self._has_time():
                         self.skipped = self.skipped or order[k:]
                         return choices, best
-                    other = {**choices, name: choice}
-                    tried = self.tried(other)
+                    smaller = {**choices, name: choice}
+                    tried = self.tried(smaller)
                     if tried.error <= self.enough and self.bench.as_cheap(tried, best):
-                        choices, best, lowered = other, tried, True
+                        choices, best, is_reduced = smaller, tried, True
                         break
                     self.failed.add((name, choice))
         return choices, best
 
-    def _worth_trying(self, name: str, choice: BodyModel) -> bool:
-        known = self.expected(name, choice)
-        most = _DOUBTFUL if choice.level == ONE_WAY else _HOPELESS
-        return known is None or known <= most * self.enough
+    def _is_promising(self, name: str, choice: BodyModel) -> bool:
+        estimate = self.expected(name, choice)
+        factor = _MAX_ONE_WAY_ESTIMATE if choice.level == ONE_WAY else _MAX_ESTIMATE
+        return estimate is None or estimate <= factor * self.enough
 
-    def _less(self, name: str, choice: BodyModel) -> Iterator[BodyModel]:
-        """What is less than a choice, the least first."""
+    def _smaller_choices(self, name: str, choice: BodyModel) -> Iterator[BodyModel]:
+        """Models smaller than a given one, the smallest first."""
         if choice.level == RIGID:
             return
         yield BodyModel(RIGID)
         if choice.level == ONE_WAY:
             return
-        yield BodyModel(
-            ONE_WAY, self.bodies.richest[name].shapes
-        )  # oscillators cost next to nothing
-        for word, n in reversed(choice.shapes):
+        # All shapes: their oscillators are computed after the run, at negligible cost.
+        yield BodyModel(ONE_WAY, self.bodies.richest[name].shapes)
+        for direction, n in reversed(choice.shapes):
             for count in sorted({0, n // 2, max(n - 1, 0)} - {n}):
-                less = choice.with_count(word, count)
-                if less.total or word == VIBRATION:
-                    yield less
+                smaller = choice.with_count(direction, count)
+                if smaller.total or direction == VIBRATION:
+                    yield smaller
         if choice.level == STIFFENED:
             yield BodyModel(LINEAR, choice.shapes)
 
-    def _more_time(self) -> bool:
+    def _has_time(self) -> bool:
         if not self.time_left():
             self.out_of_time = True
         return not self.out_of_time

@@ -1,4 +1,4 @@
-"""What an advice says in lines and tables on the terminal."""
+"""Lines and tables of an advice for the terminal."""
 
 from __future__ import annotations
 
@@ -6,64 +6,71 @@ from ..chart.tables import Table, format_time
 from .advice import Advice
 
 
-def summary(advice: Advice) -> list[str]:
-    """The advice in a few lines."""
+def summary_lines(advice: Advice) -> list[str]:
+    """Summary of the advice in one or two lines."""
     unit = "" if advice.unit == "1" else f" {advice.unit}"
-    asked = f"for an error of {advice.asked:.2g}{unit} of {advice.measure}{advice.in_words}"
-    met = "" if advice.error <= advice.asked else ", MORE than was asked"
+    target = f"for an error of {advice.asked:.2g}{unit} of {advice.measure}{advice.in_words}"
+    exceeded = "" if advice.error <= advice.asked else ", LARGER than the target error"
     lines = [
-        f"{asked}: {_model(advice)} by {advice.method}, {advice.setting}: error "
-        f"{advice.error:.1e}{met}, {format_time(advice.cpu_s)} CPU over {advice.compared}",
+        f"{target}: {_model_text(advice)} by {advice.method}, {advice.setting}: error "
+        f"{advice.error:.1e}{exceeded}, {format_time(advice.cpu_s)} CPU over {advice.compared}",
     ]
     savings = [
-        _saved("the model", advice.model_saving if advice.reduced else None, "the given scene"),
-        _saved("method and tolerance", advice.setting_saving, "the default ones"),
+        _saving_text(
+            "the model", advice.model_saving if advice.reduced else None, "the given scene"
+        ),
+        _saving_text("method and tolerance", advice.setting_saving, "the default ones"),
     ]
-    told = ", ".join(text for text in savings if text)
-    return [*lines, *([told] if told else [])]
+    text = ", ".join(saving for saving in savings if saving)
+    return [*lines, *([text] if text else [])]
 
 
-def _saved(what: str, factor: float | None, other: str) -> str:
+def _saving_text(cause: str, factor: float | None, other: str) -> str:
     if not factor:
         return ""
     if factor < 1:
-        return f"{1 / factor:.2g} times the time of {other} by {what}"
-    return f"a factor of {factor:.2g} less time than {other} by {what}"
+        return f"{cause}: {1 / factor:.2g} times the time of {other}"
+    return f"{cause}: a factor of {factor:.2g} faster than {other}"
 
 
-def _factor(saving: float) -> str:
-    """A factor of the time saved, or of what a choice costs where it saves nothing."""
-    saved, cost = f"{saving:.2g}", f"{1 / saving:.2g}"
-    if saved == "1" or cost == "1":
+def _factor_text(saving: float) -> str:
+    """Effect of a choice on CPU time: factor saved or lost."""
+    saved, lost = f"{saving:.2g}", f"{1 / saving:.2g}"
+    if saved == "1" or lost == "1":
         return "the same"
-    return f"saves a factor of {saved}" if saving > 1 else f"costs a factor of {cost}"
+    return f"saves a factor of {saved}" if saving > 1 else f"costs a factor of {lost}"
 
 
-def _model(advice: Advice) -> str:
+def _model_text(advice: Advice) -> str:
     if not advice.reduced:
         return "the scene as it is"
     return "a reduced scene"
 
 
-def bodies(advice: Advice) -> Table:
-    """The choice for each flexible body."""
-    head = ("body", "given", "advised", "error of this alone", "time of this alone")
+def body_table(advice: Advice) -> Table:
+    """Advised model of each flexible body."""
+    head = ("body", "given", "advised", "error of this choice", "time of this choice")
     rows = [
         (
-            one.name, str(one.given), str(one.choice),
-            "" if one.error is None else f"{one.error:.1e}",
-            "" if one.saving is None else _factor(one.saving),
+            body.name, str(body.given), str(body.choice),
+            "" if body.error is None else f"{body.error:.1e}",
+            "" if body.saving is None else _factor_text(body.saving),
         )
-        for one in advice.bodies
+        for body in advice.bodies
     ]  # fmt: skip
     return head, (3, 4), rows
 
 
 def trial_table(advice: Advice) -> Table:
-    """Every model that was run."""
+    """All models that were tried."""
     head = ("model", "error", "CPU time", "note")
     rows = [
-        (one.name, "" if one.error is None else f"{one.error:.1e}", format_time(one.cpu_s), one.why)
-        for one in advice.tried
+        (
+            tried.name,
+            "" if tried.error is None else f"{tried.error:.1e}",
+            format_time(tried.cpu_s),
+            tried.why,
+        )
+        for tried in advice.tried
     ]
     return head, (1, 2), rows

@@ -1,4 +1,4 @@
-"""Models tried: each one run beside the richest one, over the whole time or a part of it."""
+"""Trial runs of models, compared with the richest model over the whole run or a window."""
 
 from __future__ import annotations
 
@@ -23,33 +23,39 @@ from .measure_renaming import Renaming
 if TYPE_CHECKING:
     from ..model.model import Model
 
-#: Relative tolerance of runs that are compared, in the relative error asked for, and its bounds;
-#: the reference's is so many times tighter, and they may be apart by this part of what is asked.
-_PART, _LOOSEST, _TIGHTEST, _TIGHTER, _AGREE = 1e-3, 1e-6, 1e-12, 1e-2, 0.05
+#: Relative tolerance of trial runs as a fraction of the relative target error, and its bounds.
+_RTOL_FRACTION, _LOOSEST, _TIGHTEST = 1e-3, 1e-6, 1e-12
 
-#: The part of the run by which its time is guessed, the parts of the budget that reference runs may
-#: take and that a window aims at, and the part that one model may take.
-_LOOK, _WHOLE, _WINDOW, _ONE = 1 / 20, 0.35, 0.1, 0.2
+#: Ratio of the tolerance of the reference to that of trial runs, and largest difference of the two
+#: runs as a fraction of the target error.
+_REFERENCE_RATIO, _MAX_DIFFERENCE = 1e-2, 0.05
 
-#: Runs shorter than this (s) are made so many times: the least time counts.
+#: Fraction of the run that is simulated to estimate its CPU time.
+_PROBE_FRACTION = 1 / 20
+
+#: Fractions of the budget: for runs of the reference over the whole run, for those over a window,
+#: and for the run of one model.
+_REFERENCE_BUDGET, _WINDOW_BUDGET, _MODEL_BUDGET = 0.35, 0.1, 0.2
+
+#: Runs shorter than this (s) are repeated this many times; the smallest time counts.
 _SHORT, _REPEATS = 0.03, 3
 
-#: A model counts as cheap as another up to this many times its time, for times scatter; those below
-#: a time (s) are taken again so often at most where it seems to be dearer.
-_AS_CHEAP, _TAKEN_AGAIN, _TURNS = 1.15, 0.5, 5
+#: Models count as equally fast up to this ratio of CPU times, because timings scatter; runs below
+#: the second number (s) are timed again up to this many times if a model seems slower.
+_EQUAL_TIME_RATIO, _RETIMED_BELOW, _RETIMINGS = 1.15, 0.5, 5
 
 Compile = Callable[[Scene], "Model"]
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class ComparisonWindow:
-    """The time over which models are compared.
+    """Time span over which models are compared.
 
     Attributes:
-        t_end: s, of a window from the start, or of the whole run.
-        wanted: s, end of the run that the advice is for.
-        rise: how many times more bodies deflect after a window than in it.
+        t_end: end of the window or of the whole run, s.
+        wanted: end of the run that the advice is for, s.
+        rise: ratio of the largest deflection of bodies in the run to that in the window.
     """
 
     t_end: float
@@ -58,13 +64,12 @@ class ComparisonWindow:
 
     @property
     def whole(self) -> bool:
-        """Whether all of the run is compared."""
+        """Whether the whole run is compared."""
         return self.t_end >= self.wanted
 
     @property
     def growth(self) -> float:
-        """What errors of a window are multiplied by: they grow with the time at least, and with
-        what deflects later."""
+        """Factor on errors of a window: ratio of the times, and of the deflections."""
         return self.wanted / self.t_end * self.rise
 
     def __str__(self) -> str:
@@ -75,13 +80,15 @@ class ComparisonWindow:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """A model that was run, or why it was not.
+    """Result of the trial of a model.
 
     Attributes:
-        name: in words.
-        error: against the richest model, over the whole run; inf where it gave none.
-        cpu_s: processor time of the call, s.
-        why: what kept it from a number, "" where nothing did.
+        name: description of the model.
+        scene: scene of the model.
+        model: compiled model; None if it could not be compiled or its run failed.
+        error: error relative to the richest model, over the whole run; inf if it failed.
+        cpu_s: CPU time of the run, s.
+        why: reason of the failure, else "".
     """
 
     name: str
@@ -93,40 +100,51 @@ class TrialResult:
 
     @property
     def running(self) -> Model:
-        """The model of one that ran."""
+        """Compiled model of a trial that did not fail."""
         assert self.model is not None
         return self.model
 
 
-def probe(model: Model, t_end: float, samples: int, budget: Budget, measure: Measure,
+def choose_window(model: Model, t_end: float, samples: int, budget: Budget, measure: Measure,
           rtol: float) -> ComparisonWindow:  # fmt: skip
-    """The whole run where the reference's runs fit into their part of the budget, else a window.
+    """Select the whole run, or a window if runs of the reference exceed their time limit.
 
-    NumericalFailure where the model does not run.
+    Raises NumericalFailure if the model cannot be simulated.
     """
-    look = Runs(_LOOK * t_end, np.linspace(0.0, _LOOK * t_end, samples), budget)
-    limit = budget.left() * _WHOLE
+    runs = Runs(_PROBE_FRACTION * t_end, np.linspace(0.0, _PROBE_FRACTION * t_end, samples), budget)
+    limit = budget.left() * _REFERENCE_BUDGET
     begin = budget.clock()
-    trial = look.trial(model, Setting(AUTO, "", rtol), measure, limit)
+    trial = runs.trial(model, Setting(AUTO, "", rtol), measure, limit)
     spent = max(budget.clock() - begin, 1e-9)
     if trial.late:
         raise NumericalFailure(
-            f"a twentieth of the run, {_LOOK * t_end:.3g} s, takes the richest model more than "
-            f"{limit:.3g} s; give more --budget, or end earlier"
+            f"the richest model needs more than {limit:.3g} s for {_PROBE_FRACTION * t_end:.3g} s, "
+            "a twentieth of the run; give a larger --budget or an earlier end time"
         )
     if trial.numbers is None:
         raise NumericalFailure(trial.failure)
-    cost = 3.0 * spent / _LOOK  # two runs, one of them tighter
-    if cost <= _WHOLE * budget.left():
+    cost = 3.0 * spent / _PROBE_FRACTION  # two runs, one of them tighter
+    if cost <= _REFERENCE_BUDGET * budget.left():
         return ComparisonWindow(t_end, t_end)
-    part = _WINDOW * budget.left() / cost
-    return ComparisonWindow(max(min(part, 1.0), _LOOK) * t_end, t_end)
+    fraction = _WINDOW_BUDGET * budget.left() / cost
+    return ComparisonWindow(max(min(fraction, 1.0), _PROBE_FRACTION) * t_end, t_end)
 
 
 class TrialRunner:
-    """Runs models beside the reference and keeps what they gave.
+    """Runner of trial models: compares them with the reference, and keeps the results.
 
-    `measure` is scaled by the reference; `rtol` is the tolerance of the runs.
+    Attributes:
+        span: compared time span.
+        measure: error measure, scaled by the reference.
+        budget: time limit.
+        runs: runs over the time span.
+        compile: function that compiles a scene.
+        tell: callback with a sentence before every run.
+        rtol: relative tolerance of trial runs.
+        names: former names of bodies and ends -> names in the scene of the reference.
+        reference: run of the richest model.
+        floor: difference of two runs of the richest model.
+        late: models that exceeded their time limit.
     """
 
     def __init__(
@@ -136,7 +154,7 @@ class TrialRunner:
         budget: Budget,
         measure: Renaming,
         compile: Compile,
-        tell: Tell,
+        tell: Report,
     ) -> None:
         self.span, self.measure, self.budget = span, measure, budget
         self.runs = Runs(span.t_end, np.linspace(0.0, span.t_end, samples), budget)
@@ -145,76 +163,80 @@ class TrialRunner:
         self.names: Mapping[str, str] = {}
         self.reference: Trial
         self.floor = 0.0
-        self.late: list[str] = []  #: models that took more than their part of the budget
-        self._found: dict[str, TrialResult] = {}
+        self.late: list[str] = []
+        self._results: dict[str, TrialResult] = {}
 
     def refer_to(
         self, scene: Scene, model: Model, name: str, asked: float, part: float
     ) -> TrialResult:
-        """Run the richest model until two tolerances agree; `part` is what is asked in parts.
+        """Run the richest model with tighter tolerances until two runs agree.
 
-        NumericalFailure where they do not.
+        `asked` is the target error, `part` relative to the size of the motion.  Raises
+        NumericalFailure if they do not agree.
         """
-        self.rtol = first_rtol(part)
-        run = self._run(model, name, self.rtol)
+        self.rtol = initial_rtol(part)
+        run = self._run_richest(model, name, self.rtol)
         while True:
-            tight = max(self.rtol * _TIGHTER, _TIGHTEST)
-            tighter = self._run(model, name, tight)
-            self.measure.scale_by(_numbers(tighter))
-            apart = max_error(run, tighter, self.measure)
-            far = math.inf if isinstance(apart, str) else apart * self.span.growth
-            if far <= _AGREE * asked:
+            tighter_rtol = max(self.rtol * _REFERENCE_RATIO, _TIGHTEST)
+            tighter = self._run_richest(model, name, tighter_rtol)
+            self.measure.scale_by(_measured_values(tighter))
+            difference = self.apart(run, tighter)
+            if difference <= _MAX_DIFFERENCE * asked:
                 break
-            if tight <= _TIGHTEST:
+            if tighter_rtol <= _TIGHTEST:
                 raise NumericalFailure(
-                    f"two runs of the richest model are {far:.1e} apart at tolerances of "
-                    f"{self.rtol:.0e} and {tight:.0e}, so that no error of {asked:.1e} can be "
-                    "judged: end earlier, or allow a larger error"
+                    f"two runs of the richest model with rtol {self.rtol:.0e} and "
+                    f"{tighter_rtol:.0e} differ by {difference:.1e}: an error of {asked:.1e} "
+                    "cannot be resolved; give an earlier end time or a larger target error"
                 )
-            self.rtol, run = tight, tighter
-        self.reference, self.floor = tighter, far
-        tried = self._kept(name, scene, model, run)
-        return replace(tried, error=far)
+            self.rtol, run = tighter_rtol, tighter
+        self.reference, self.floor = tighter, difference
+        tried = self._store_result(name, scene, model, run)
+        return replace(tried, error=difference)
 
     def finer(self, scene: Scene, names: Mapping[str, str], name: str) -> Trial:
-        """A run of a model that is richer than the richest one.
+        """Run a model that is richer than the richest one, such as one with split beams.
 
-        Raises MstmmError where it cannot be made; the trial says where it fails.
+        `names` are its names of bodies and ends.  Raises MstmmError if it cannot be compiled; a
+        failure of the run is part of the trial.
         """
         self.tell(name)
         model = self.compile(scene)
         self.measure.know(model, names)
-        limit = self.budget.left() * _ONE
+        limit = self.budget.left() * _MODEL_BUDGET
         return self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
 
     def apart(self, a: Trial, b: Trial) -> float:
-        """How far two runs are apart, over the whole run; inf where that is not known."""
-        found = max_error(a, b, self.measure)
-        return math.inf if isinstance(found, str) else found * self.span.growth
+        """Difference of two runs, extrapolated to the whole run; inf if unknown."""
+        error = max_error(a, b, self.measure)
+        return math.inf if isinstance(error, str) else error * self.span.growth
 
     def refer_again(self, trial: Trial, names: Mapping[str, str]) -> None:
-        """Take another run as the reference, and other names that places have from now on."""
+        """Use another run as the reference, with its names of bodies and ends; drop all results."""
         self.reference, self.names = trial, names
-        self.measure.scale_by(_numbers(trial))
-        self._found.clear()
+        self.measure.scale_by(_measured_values(trial))
+        self._results.clear()
 
     def tried(
         self, name: str, scene: Scene, names: Mapping[str, str] | None = None,
         still: Mapping[str, Vector] | None = None,
     ) -> TrialResult:  # fmt: skip
-        """A model that was run; `names` are other names that places have in it, those of the
-        reference's scene unless given, `still` places that are on the ground, m."""
-        if name not in self._found:
+        """Result of the trial of a scene, run once per name.
+
+        `names`: former name of a body or end -> its name in the scene, by default as in the scene
+        of the reference; `still`: name -> fixed position on the ground, m.
+        """
+        if name not in self._results:
             self.tell(name)
-            self._found[name] = self._try(name, scene, names, still)
-        return self._found[name]
+            self._results[name] = self._run_model(name, scene, names, still)
+        return self._results[name]
 
     @property
     def all(self) -> tuple[TrialResult, ...]:
-        """Everything that was tried, in its order."""
-        return tuple(self._found.values())
+        """Results of all trials, in their order."""
+        return tuple(self._results.values())
 
-    def _try(
+    def _run_model(
         self, name: str, scene: Scene, names: Mapping[str, str] | None,
         still: Mapping[str, Vector] | None,
     ) -> TrialResult:  # fmt: skip
@@ -223,25 +245,25 @@ class TrialRunner:
             self.measure.know(model, self.names if names is None else names, still)
         except MstmmError as problem:
             return TrialResult(name, scene, None, math.inf, math.inf, str(problem))
-        limit = self.budget.left() * _ONE
+        limit = self.budget.left() * _MODEL_BUDGET
         trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
         if trial.late:
             self.late.append(name)
-        return self._kept(name, scene, model, trial)
+        return self._store_result(name, scene, model, trial)
 
-    def _kept(self, name: str, scene: Scene, model: Model, trial: Trial) -> TrialResult:
+    def _store_result(self, name: str, scene: Scene, model: Model, trial: Trial) -> TrialResult:
         if trial.numbers is None:
             tried = TrialResult(name, scene, None, math.inf, trial.cpu_s, trial.failure)
         else:
-            found = max_error(trial, self.reference, self.measure)
-            error, why = (math.inf, found) if isinstance(found, str) else (found, "")
-            spent = self._least(model, trial)
-            tried = TrialResult(name, scene, model, error * self.span.growth, spent, why)
-        self._found[name] = tried
+            result = max_error(trial, self.reference, self.measure)
+            error, reason = (math.inf, result) if isinstance(result, str) else (result, "")
+            cpu_s = self._min_cpu_s(model, trial)
+            tried = TrialResult(name, scene, model, error * self.span.growth, cpu_s, reason)
+        self._results[name] = tried
         return tried
 
-    def _least(self, model: Model, trial: Trial) -> float:
-        """The least time of several runs where they are short."""
+    def _min_cpu_s(self, model: Model, trial: Trial) -> float:
+        """CPU time of a run, s; for a short run the smallest of several."""
         times = [trial.cpu_s]
         if trial.cpu_s < _SHORT:
             times += [
@@ -251,11 +273,13 @@ class TrialRunner:
         return min(times)
 
     def as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
-        """Whether a model takes no more time than another, up to what times scatter.  Where it
-        seems to, both are timed again in turn, for something else may have kept it."""
-        pair, least = (one, other), [one.cpu_s, other.cpu_s]
-        for _ in range(_TURNS):
-            if least[0] <= _AS_CHEAP * least[1] or not max(least) < _TAKEN_AGAIN:
+        """Whether a model is not slower than another, within the scatter of timings.
+
+        If it seems slower, both are timed again in turn: other processes may have delayed it.
+        """
+        pair, times = (one, other), [one.cpu_s, other.cpu_s]
+        for _ in range(_RETIMINGS):
+            if times[0] <= _EQUAL_TIME_RATIO * times[1] or not max(times) < _RETIMED_BELOW:
                 break
             for k, tried in enumerate(pair):
                 setting = Setting(AUTO, tried.name, self.rtol)
@@ -263,25 +287,25 @@ class TrialRunner:
                     spent = self.runs.simulate(tried.running, setting, self.budget.left())[1]
                 except OutOfTime:
                     return False
-                least[k] = min(least[k], spent)
-        return least[0] <= _AS_CHEAP * least[1]
+                times[k] = min(times[k], spent)
+        return times[0] <= _EQUAL_TIME_RATIO * times[1]
 
-    def _run(self, model: Model, name: str, rtol: float) -> Trial:
-        """One run of the richest model; NumericalFailure where it gives nothing."""
-        limit = self.budget.left() * 2 * _WHOLE
+    def _run_richest(self, model: Model, name: str, rtol: float) -> Trial:
+        """Run the richest model; NumericalFailure if the run fails."""
+        limit = self.budget.left() * 2 * _REFERENCE_BUDGET
         self.tell(f"{name}, rtol {rtol:.0e}")
         trial = self.runs.trial(model, Setting(AUTO, name, rtol), self.measure, limit)
         if trial.numbers is None:
-            more = "; give more --budget" if trial.late else ""
-            raise NumericalFailure(f"{name}: {trial.failure}{more}")
+            remedy = "; give a larger --budget" if trial.late else ""
+            raise NumericalFailure(f"{name}: {trial.failure}{remedy}")
         return trial
 
 
-def first_rtol(part: float) -> float:
-    """The tolerance to begin with for an error in parts of the motion."""
-    return min(max(_PART * part, 100 * _TIGHTEST), _LOOSEST)
+def initial_rtol(part: float) -> float:
+    """First relative tolerance for a target error relative to the size of the motion."""
+    return min(max(_RTOL_FRACTION * part, 100 * _TIGHTEST), _LOOSEST)
 
 
-def _numbers(trial: Trial) -> np.ndarray:
+def _measured_values(trial: Trial) -> np.ndarray:
     assert trial.numbers is not None
     return trial.numbers

@@ -13,8 +13,8 @@ from chart.scenes import Clock, hub, pendulum
 
 import mstmm
 from mstmm.runtime.advice.advise import make_advice
-from mstmm.runtime.advice.error_predictors import evidence_of
-from mstmm.runtime.advice.request import request
+from mstmm.runtime.advice.error_predictors import body_predictions
+from mstmm.runtime.advice.request import advice_request
 from mstmm.runtime.advice.trial_models import ComparisonWindow
 from mstmm.runtime.chart.time_budget import Budget
 
@@ -119,7 +119,7 @@ def test_as_plain_values() -> None:
 def test_a_window_where_the_whole_run_takes_too_long() -> None:
     """By a clock of which a tenth of the budget passes at each look."""
     model = mstmm.compile(hub_and_beam("B", 2), engine="looped")
-    asked = request(period("B"), 1e-2, TIP, 100.0, 51, 0)
+    asked = advice_request(period("B"), 1e-2, TIP, 100.0, 51, 0)
     said: list[str] = []
     made = make_advice(
         model, asked, lambda scene: mstmm.compile(scene, engine="looped"), lambda _: None,
@@ -148,6 +148,6 @@ def test_what_deflects_after_a_window() -> None:
         flexibility="one-way",
     )  # fmt: skip
     result = model.simulate(2.0, output_times=np.linspace(0, 2, 101))
-    known = evidence_of(result, 1.0)["arm"]
+    known = body_predictions(result, 1.0)["arm"]
     assert 5 < known.rise(0.9) < 15
     assert known.rise(2.0) == 1.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import mstmm
 from mstmm.runtime.advice.measure_renaming import rename_reference
 from mstmm.runtime.advice.scene_edits import chain_expansion
-from mstmm.runtime.advice.scene_edits.chain_expansion import expand_chains, short
+from mstmm.runtime.advice.scene_edits.chain_expansion import expand_chains, expandable_chains
 from mstmm.runtime.advice.scene_edits.weld_merging import merge_welds
 
 OF = "rope[last].tip.position"
@@ -57,7 +57,7 @@ NAMES = ["rope[0]", "rope[1].tip", "rope[3].tip", "rope[last].tip"]
 
 def test_written_out_it_is_the_same() -> None:
     scene = rope(4, {"law": {"stiffness": 3.0}}, {"law": {"damping": 0.1}}, **spoken_of())
-    found = expand_chains(scene, short(scene))
+    found = expand_chains(scene, expandable_chains(scene))
     read = mstmm.Scene.from_data(tomllib.loads(found.scene.to_toml()))
     assert read.chain == ()
     assert read.event[0].when.text == "rope_3.tip.y + rope_2_hinge.q > 100"
@@ -73,7 +73,7 @@ def test_names_that_are_taken() -> None:
     pin = {"name": "rope_1_hinge", "type": "pin", "inboard": "rope[1].tip", "outboard": "rope_1"}
     given = rope(2, {}).model_dump(by_alias=True, exclude_none=True)
     scene = mstmm.Scene(**given | {"body": [*given["body"], bob], "hinge": [*given["hinge"], pin]})
-    found = expand_chains(scene, short(scene))
+    found = expand_chains(scene, expandable_chains(scene))
     assert found.names["rope[1].tip"] == "rope_1_.tip"
     assert found.names["rope[1].hinge"] == "rope_1_hinge_"
     names = ["rope_1", "rope[last].tip"]
@@ -117,7 +117,7 @@ def test_stiff_members_become_rigid_and_one() -> None:
     assert [body.name for body in made.scene.body] == ["rope_0", "rope_2", "rope_4"]
     assert made.renamed("rope[last].tip") == "rope_4.rope_5_tip"
     assert 'hinge "rope[3].hinge": rigid' in " ".join(made.changes)
-    assert 'chain "rope": bodies of their own, rope_0 to rope_5' in " ".join(made.changes)
+    assert 'chain "rope": expanded into bodies rope_0 to rope_5' in " ".join(made.changes)
 
 
 def test_dampers_of_a_chain_that_hardly_matter_go_together() -> None:
@@ -138,7 +138,7 @@ def test_dampers_of_some_members() -> None:
 
 
 def test_long_chains_stay_chains(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chain_expansion, "MOST", 2)
+    monkeypatch.setattr(chain_expansion, "MAX_MEMBERS", 2)
     made = advised(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
     assert made.scene.chain[0].hinge[0].law.damping == (0.0,)
     stiff = advised(rope(3, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)

@@ -32,9 +32,9 @@ def test_stiff_hinges_become_rigid() -> None:
     assert 'hinge "pivot": without its damper' in told
     for name in ("spring", "bushing", "slide"):
         (one,) = (text for text in made.changes if text.startswith(f'hinge "{name}": rigid'))
-        found = re.search(r"with that alone the scene errs by (\S+) and takes (\S+) of", one)
+        found = re.search(r"this change alone: error (\S+), (\S+) of the time before", one)
         assert found and float(found[1]) <= 1e-2 and float(found[2]) > 0
-    assert any("with these 3 changes the scene errs by" in text for text in made.changes)
+    assert any("with these 3 changes: error" in text for text in made.changes)
     assert mstmm.compile(made.scene, engine="looped").nu == 1
     assert made.reduced
     assert made.model_saving is not None
@@ -119,5 +119,5 @@ def test_what_takes_longer_saves_nothing(saving: float, words: str) -> None:
     class One:
         bodies = (BodyAdvice("arm", BodyModel(RIGID), BodyModel(RIGID), 0.0, saving, ""),)
 
-    head, _, rows = tables.bodies(One())  # type: ignore[arg-type]
+    head, _, rows = tables.body_table(One())  # type: ignore[arg-type]
     assert rows[0][-1] == words and "saves" not in head[-1]

@@ -152,7 +152,7 @@ def test_welded_to_the_ground(rng: np.random.Generator) -> None:
     assert [body.name for body in found.scene.body] == ["s"]
     assert found.into == {"p": "ground", "q": "ground", "r": "ground", "t": "s"}
     assert set(found.idle) == {'load "load1"', 'spring "idle"'}
-    assert any(text.startswith("the ground: one with") for text in found.words)
+    assert any(text.startswith("the ground: merged with") for text in found.words)
     stays = same(scene, keep=["q"])
     assert [body.name for body in stays.scene.body] == ["q", "s"]
 

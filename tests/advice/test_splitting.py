@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import mstmm
-from mstmm.runtime.advice.beam_splitting import divisible, in_parts, unfit
+from mstmm.runtime.advice.beam_splitting import make_splittable, split_beams, split_obstacle
 from mstmm.runtime.advice.measure_renaming import rename_reference
 from mstmm.runtime.chart.model_levels import with_model_level
 from mstmm.scene.tables.beam import Beam
@@ -50,7 +50,7 @@ def test_the_same_body(held: str, count: int) -> None:
     """Rigid, the parts move as the whole does: masses, ends, loads and springs are where they
     were."""
     whole = scene(held)
-    found = in_parts(whole, ["beam"], count)
+    found = split_beams(whole, ["beam"], count)
     assert len(found.scene.beam) == count
     for name in ("beam.root", "beam.mid", "beam.tip", "bob"):
         one = place(with_model_level(whole, "rigid"), name)
@@ -65,7 +65,7 @@ def test_the_same_bending() -> None:
     pin.pop("initial")
     pin.pop("law")
     still = mstmm.Scene(**whole | {"hinge": [pin, whole["hinge"][1]]})
-    found = in_parts(still, ["beam"], 3)
+    found = split_beams(still, ["beam"], 3)
     one, other = (
         place(still, "beam.tip"),
         place(found.scene, rename_reference("beam.tip", found.names)),
@@ -79,26 +79,28 @@ def test_what_speaks_of_an_end_speaks_of_that_of_a_part() -> None:
     data = scene("root").model_dump(by_alias=True, exclude_none=True)
     event = {"name": "low", "when": "beam.tip.y + 2*bob.y < -1.5", "do": "stop"}
     output = {"name": "high", "of": "beam.mid.y - beam.root.y"}
-    found = in_parts(mstmm.Scene(**data | {"event": [event], "output": [output]}), ["beam"], 3)
+    found = split_beams(mstmm.Scene(**data | {"event": [event], "output": [output]}), ["beam"], 3)
     assert found.scene.event[0].when.text == "beam_3.tip.y + 2*bob.y < -1.5"
     assert found.scene.output[0].of.text == "beam_2.mid.y - beam.root.y"
 
 
 def test_what_cannot_be_split() -> None:
     keys = scene("root").beam[0].model_dump(by_alias=True, exclude_none=True)
-    assert unfit(Beam.model_validate(keys)) == ""
-    assert "start" in unfit(Beam.model_validate(keys | {"initial": {"eta": [0.0] * 4}}))
-    assert "left open" in unfit(Beam.model_validate(keys | {"modes": "auto"}))
+    assert split_obstacle(Beam.model_validate(keys)) == ""
+    assert "initial state" in split_obstacle(
+        Beam.model_validate(keys | {"initial": {"eta": [0.0] * 4}})
+    )
+    assert "left open" in split_obstacle(Beam.model_validate(keys | {"modes": "auto"}))
 
 
 def test_shapes_and_damping_of_the_whole_are_left() -> None:
     keys = scene("root").beam[0].model_dump(by_alias=True, exclude_none=True)
     plain = Beam.model_validate(keys)
-    assert divisible(plain, 20.0) == (plain, "")
+    assert make_splittable(plain, 20.0) == (plain, "")
     given = keys | {"damping": 0.03, "shapes": {"y": ["x^2", "x^3"]}, "modes": {"y": 2}}
-    made, words = divisible(Beam.model_validate(given | {"basis": "auto"}), 20.0)
+    made, words = make_splittable(Beam.model_validate(given | {"basis": "auto"}), 20.0)
     assert made.damping.ratio == (0.0,)
     assert made.damping.stiffness == pytest.approx(0.003)
     assert (made.basis, made.shapes) == ("auto", None)
-    assert "0.003 s times its stiffness" in words
+    assert "stiffness-proportional damping (0.003 s)" in words
     assert "given ones" in words

@@ -19,7 +19,7 @@ ERROR = 1e-3
 
 @pytest.fixture(autouse=True)
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(advise, "probe", lambda *_: ComparisonWindow(WINDOW, T_END))
+    monkeypatch.setattr(advise, "choose_window", lambda *_: ComparisonWindow(WINDOW, T_END))
 
 
 def advised(**scene: Any) -> mstmm.Advice:

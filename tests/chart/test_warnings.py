@@ -56,7 +56,9 @@ def test_warnings_stand_beside_their_points() -> None:
         in [row[-1] for row in point_table(chart)[2]][chart.points.index(warned)]
     )
     page = chart.to_html()
-    assert page.count("warning: ") > len([p for p in chart.points if p.warnings])  # pointer and table
+    assert page.count("warning: ") > len(
+        [p for p in chart.points if p.warnings]
+    )  # pointer and table
 
 
 def test_a_step_that_is_too_long_is_never_recommended() -> None:

@@ -15,8 +15,8 @@ from scene.scenes import body
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.pipeline.compilation import compile_level
-from mstmm.runtime.advice.beam_splitting import in_parts
-from mstmm.runtime.advice.reduced_outputs import with_outputs_there
+from mstmm.runtime.advice.beam_splitting import split_beams
+from mstmm.runtime.advice.reduced_outputs import with_available_outputs
 from mstmm.runtime.chart.model_levels import with_model_level
 from mstmm.runtime.engine.observation_columns import SUMS
 from mstmm.runtime.result.result import Result
@@ -182,13 +182,15 @@ def test_a_lower_level_lacks_outputs_of_what_it_lacks(tmp_path: Path) -> None:
 
 
 def test_outputs_follow_a_beam_into_its_parts() -> None:
-    split = in_parts(blade({"name": "reach", "of": "blade.tip.x - 0.5*blade.tip.x"}), ["blade"], 2)
+    split = split_beams(
+        blade({"name": "reach", "of": "blade.tip.x - 0.5*blade.tip.x"}), ["blade"], 2
+    )
     assert split.scene.output[0].of.text == "blade_2.tip.x - 0.5*blade_2.tip.x"
     mstmm.compile(split.scene)
 
 
 def test_a_reduced_scene_keeps_the_outputs_that_it_has() -> None:
-    reduced = with_outputs_there(with_model_level(blade(BENT, TIP), "rigid"), compile_level)
+    reduced = with_available_outputs(with_model_level(blade(BENT, TIP), "rigid"), compile_level)
     assert [output.name for output in reduced.output] == ["tip"]
     assert list(mstmm.compile(reduced).simulate(0.1).outputs()) == ["tip"]
 

@@ -109,14 +109,17 @@ def advise(
 
 
 def _print_advice(made: Advice, files: list[str]) -> None:
-    from mstmm.runtime.advice.tables import bodies, summary, trial_table
+    from mstmm.runtime.advice.tables import body_table, summary_lines, trial_table
 
     from .. import terminal_output
 
-    for line in summary(made):
+    for line in summary_lines(made):
         terminal_output.print_lines(line)
     console = terminal_output.table_console()
-    for title, (head, numbers, rows) in (("", bodies(made)), ("models tried", trial_table(made))):
+    for title, (head, numbers, rows) in (
+        ("", body_table(made)),
+        ("models tried", trial_table(made)),
+    ):
         if rows:
             columns = [name + ">" * (i in numbers) for i, name in enumerate(head)]
             terminal_output.print_lines()

@@ -1,1 +1,1 @@
-"""Scenes written otherwise: chains as bodies of their own, welded bodies as one, other names."""
+"""Edits of a scene: expand chains, merge welded bodies, rename references."""

@@ -1,4 +1,4 @@
-"""Chains written out: their members as bodies and hinges of their own, which may be changed alone.
+"""Expand chains into separate bodies and hinges, which can be changed individually.
 
 "rope[3]" becomes "rope_3", its hinge "rope[3].hinge" becomes "rope_3_hinge".
 """
@@ -12,15 +12,15 @@ from mstmm.scene import Body, Chain, Hinge, Scene
 from mstmm.scene.tables.chain import HINGE_SUFFIX
 
 from ...chart.model_levels import with_tables
-from .reference_renaming import with_names
+from .reference_renaming import with_references
 
-#: Chains of more members stay chains.
-MOST = 100
+#: Chains with more members are not expanded.
+MAX_MEMBERS = 100
 
 
 @dataclass(frozen=True)
 class Member:
-    """A member of a chain: its body and its hinge as they are called there, and their new names."""
+    """Names of the body and the hinge of a chain member, in the chain and when expanded."""
 
     body: str
     hinge: str
@@ -30,11 +30,11 @@ class Member:
 
 @dataclass(frozen=True)
 class ExpandedScene:
-    """A scene with chains written out.
+    """Scene with expanded chains.
 
     Attributes:
-        scene: the new one.
-        names: places and hinges of the chains -> their names in it.
+        scene: the new scene.
+        names: body, end or hinge of a chain -> its name in the new scene.
         words: a sentence for each chain.
     """
 
@@ -43,58 +43,60 @@ class ExpandedScene:
     words: tuple[str, ...] = ()
 
 
-def short(scene: Scene) -> tuple[Chain, ...]:
-    """Chains with few enough members to be written out."""
-    return tuple(chain for chain in scene.chain if chain.count <= MOST)
+def expandable_chains(scene: Scene) -> tuple[Chain, ...]:
+    """Chains with few enough members to be expanded."""
+    return tuple(chain for chain in scene.chain if chain.count <= MAX_MEMBERS)
 
 
-def members(scene: Scene, chain: Chain) -> Iterator[Member]:
-    """The members of a chain, whatever else is written out."""
-    taken = {one.name for one in scene.skeleton.body} | {one.name for one in scene.hinge}
-    taken |= {one.name for one in scene.chain}
+def chain_members(scene: Scene, chain: Chain) -> Iterator[Member]:
+    """Members of a chain; their new names do not depend on which chains are expanded."""
+    taken = {body.name for body in scene.skeleton.body} | {hinge.name for hinge in scene.hinge}
+    taken |= {chain.name for chain in scene.chain}
     for k in range(chain.count):
-        old = f"{chain.name}[{k}]"
+        member = f"{chain.name}[{k}]"
         body, hinge = (
-            _unused(name, taken)
+            _unused_name(name, taken)
             for name in (f"{chain.name}_{k}", f"{chain.name}_{k}_{HINGE_SUFFIX}")
         )
-        yield Member(old, f"{old}.{HINGE_SUFFIX}", body, hinge)
+        yield Member(member, f"{member}.{HINGE_SUFFIX}", body, hinge)
 
 
-def _unused(name: str, taken: Collection[str]) -> str:
+def _unused_name(name: str, taken: Collection[str]) -> str:
     while name in taken:
         name += "_"
     return name
 
 
 def expand_chains(scene: Scene, chains: Collection[Chain]) -> ExpandedScene:
-    """The scene with these chains as bodies and hinges."""
+    """Expand these chains into bodies and hinges."""
     if not chains:
         return ExpandedScene(scene)
-    places: dict[str, str] = {}
-    hinges: dict[str, str] = {}
-    own_bodies: list[Body] = []
-    own_hinges: list[Hinge] = []
+    place_names: dict[str, str] = {}
+    hinge_names: dict[str, str] = {}
+    bodies: list[Body] = []
+    hinges: list[Hinge] = []
     words = []
     for chain in chains:
-        row = list(members(scene, chain))
-        last = f"{chain.name}[last]"
-        for one in row:
-            body = scene.bodies.by_name[one.body]
-            own_bodies.append(body.model_copy(update={"name": one.new_body}))
-            named = {"name": one.new_hinge, "outboard": one.new_body}
-            own_hinges.append(scene.hinges.by_name[one.hinge].model_copy(update=named))
-            for old in (one.body, *([last] if one is row[-1] else ())):
-                hinges[f"{old}.{HINGE_SUFFIX}"] = one.new_hinge
-                places[old] = one.new_body
-                places |= {f"{old}.{end}": f"{one.new_body}.{end}" for end in body.ends}
+        members = list(chain_members(scene, chain))
+        last_name = f"{chain.name}[last]"
+        for member in members:
+            body = scene.bodies.by_name[member.body]
+            bodies.append(body.model_copy(update={"name": member.new_body}))
+            update = {"name": member.new_hinge, "outboard": member.new_body}
+            hinges.append(scene.hinges.by_name[member.hinge].model_copy(update=update))
+            for name in (member.body, *([last_name] if member is members[-1] else ())):
+                hinge_names[f"{name}.{HINGE_SUFFIX}"] = member.new_hinge
+                place_names[name] = member.new_body
+                place_names |= {f"{name}.{end}": f"{member.new_body}.{end}" for end in body.ends}
+        first, last = members[0], members[-1]
         words.append(
-            f'chain "{chain.name}": bodies of their own, {row[0].new_body} to '
-            f"{row[-1].new_body}, on {row[0].new_hinge} to {row[-1].new_hinge}"
+            f'chain "{chain.name}": expanded into bodies {first.new_body} to {last.new_body} with '
+            f"hinges {first.new_hinge} to {last.new_hinge}"
         )
-    gone = {chain.name for chain in chains}
-    kept = tuple(chain for chain in scene.chain if chain.name not in gone)
-    made = with_tables(
-        scene, body=(*scene.body, *own_bodies), hinge=(*scene.hinge, *own_hinges), chain=kept
+    expanded_names = {chain.name for chain in chains}
+    other_chains = tuple(chain for chain in scene.chain if chain.name not in expanded_names)
+    expanded = with_tables(
+        scene, body=(*scene.body, *bodies), hinge=(*scene.hinge, *hinges), chain=other_chains
     )
-    return ExpandedScene(with_names(made, places, hinges), {**places, **hinges}, tuple(words))
+    renamed = with_references(expanded, place_names, hinge_names)
+    return ExpandedScene(renamed, {**place_names, **hinge_names}, tuple(words))

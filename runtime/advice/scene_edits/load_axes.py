@@ -1,4 +1,4 @@
-"""Loads along the axes of a body that is part of another one."""
+"""Loads along the axes of a body that becomes part of another one."""
 
 from __future__ import annotations
 
@@ -16,68 +16,75 @@ from .reference_renaming import OWN_AXES
 Entries = tuple[Expression, ...]
 
 
-def with_axes_of(scene: Scene, gone: str, axes: str, turned: Matrix) -> Scene:
-    """The scene whose loads along the axes of a body that goes are along other `axes`, in which
-    those lie by the rotation `turned` (3, 3)."""
+def with_load_axes(scene: Scene, removed_body: str, axes: str, rotation: Matrix) -> Scene:
+    """Express loads along the axes of a removed body along other `axes`.
+
+    `rotation` (3, 3) is the orientation of the axes of the removed body in the new ones.
+    """
     return with_tables(
         scene,
         load=tuple(
-            _turned(load, axes, turned) if _axes_of(load) == gone else load for load in scene.load
+            _rotated_load(load, axes, rotation) if _axes_body(load) == removed_body else load
+            for load in scene.load
         ),
     )
 
 
 def with_ends_at_mass_centers(scene: Scene) -> Scene:
-    """The scene whose loads at mass centres of welded bodies act at ends there, which stay where
-    they are in a body of several."""
+    """Move loads at mass centres of welded bodies to new ends at the same points.
+
+    The mass centre of a merged body is another point; the ends remain.
+    """
     welded = {e for h in scene.hinge if h.is_weld for e in (h.inboard_body, h.outboard_body)}
-    moved = {load.on for load in scene.load if load.at == MASS_CENTER} & welded
-    if not moved:
+    loaded = {load.on for load in scene.load if load.at == MASS_CENTER} & welded
+    if not loaded:
         return scene
     ends = {
-        body.name: _free_name(body.ends, MASS_CENTER) for body in scene.body if body.name in moved
+        body.name: _unused_name(body.ends, MASS_CENTER)
+        for body in scene.body
+        if body.name in loaded
     }
     return with_tables(
         scene,
         body=tuple(
-            one.model_copy(
-                update={"ends": {**one.ends, ends[one.name]: End(position=one.center_of_mass)}}
-            ) if one.name in ends else one for one in scene.body
+            body.model_copy(
+                update={"ends": {**body.ends, ends[body.name]: End(position=body.center_of_mass)}}
+            ) if body.name in ends else body for body in scene.body
         ),
         load=tuple(
-            one.model_copy(update={"on": f"{one.on}.{ends[one.on]}", "at": None})
-            if one.at == MASS_CENTER and one.on in ends else one for one in scene.load
+            load.model_copy(update={"on": f"{load.on}.{ends[load.on]}", "at": None})
+            if load.at == MASS_CENTER and load.on in ends else load for load in scene.load
         ),
     )  # fmt: skip
 
 
-def _free_name(taken: Collection[str], name: str) -> str:
+def _unused_name(taken: Collection[str], name: str) -> str:
     while name in taken:
         name += "_"
     return name
 
 
-def _axes_of(load: Load) -> str:
+def _axes_body(load: Load) -> str:
     return split_reference(load.on)[0] if load.axes == OWN_AXES else load.axes
 
 
-def _turned(load: Load, axes: str, turned: Matrix) -> Load:
+def _rotated_load(load: Load, axes: str, rotation: Matrix) -> Load:
     update: dict[str, Any] = {"axes": axes}
     for key in ("force", "moment"):
-        update[key] = tuple(_sum(row, getattr(load, key)) for row in turned)
+        update[key] = tuple(_combined_component(row, getattr(load, key)) for row in rotation)
     return load.model_copy(update=update)
 
 
-def _sum(row: Sequence[float], entries: Entries) -> Expression:
-    """A component along other axes."""
-    parts = [
-        (factor, one) for factor, one in zip(row, entries, strict=True)
-        if factor != 0 and not one.is_zero
+def _combined_component(row: Sequence[float], entries: Entries) -> Expression:
+    """Component of a vector along another axis: sum of row[k] * entries[k]."""
+    terms = [
+        (factor, entry) for factor, entry in zip(row, entries, strict=True)
+        if factor != 0 and not entry.is_zero
     ]  # fmt: skip
-    if not parts:
+    if not terms:
         return number(0)
-    if len(parts) == 1 and parts[0][0] == 1:
-        return parts[0][1]
-    constants = {name: value for _, one in parts for name, value in one.constants}
-    text = " + ".join(f"({factor!r})*({one.text})" for factor, one in parts)
+    if len(terms) == 1 and terms[0][0] == 1:
+        return terms[0][1]
+    constants = {name: value for _, entry in terms for name, value in entry.constants}
+    text = " + ".join(f"({factor!r})*({entry.text})" for factor, entry in terms)
     return parse(text, constants=constants)

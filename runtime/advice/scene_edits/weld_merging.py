@@ -1,9 +1,9 @@
-"""Welded rigid bodies as one: their mass, mass centre and inertia together, their ends kept.
+"""Merge welded rigid bodies: combined mass, mass centre and inertia; their ends remain.
 
-A body that is welded to another one becomes part of it.  Its origin and its ends live on as ends of
-that one, under names that tell where they come from: "arm.tip" on "hub" becomes "hub.arm_tip".
-What is welded to the ground becomes part of that: what hung on it hangs on the ground, where its
-ends are.
+A body that is welded to another one becomes part of it.  Its origin and its ends become ends of
+that body, named after their former body: "arm.tip" on "hub" becomes "hub.arm_tip".  A body welded
+to the ground becomes part of the ground; what was attached to it is attached to the ground at the
+same point.
 """
 
 from __future__ import annotations
@@ -29,22 +29,23 @@ from ...packing.merging.weld_geometry import (
 )
 from ..body_model_levels import RIGID
 from ..measure_renaming import compose_names, rename_reference
-from .chain_expansion import ExpandedScene, expand_chains, short
-from .load_axes import with_axes_of, with_ends_at_mass_centers
-from .reference_renaming import INERTIAL, with_names
+from .chain_expansion import ExpandedScene, expand_chains, expandable_chains
+from .load_axes import with_ends_at_mass_centers, with_load_axes
+from .reference_renaming import INERTIAL, with_references
 
 
 @dataclass(frozen=True)
 class MergedScene:
-    """A scene with fewer bodies.
+    """Scene with merged bodies.
 
     Attributes:
-        scene: with welded bodies as one.
-        names: "arm" and "arm.tip" of the former scene -> "hub.arm", "hub.arm_tip", or "ground".
-        into: body that is gone -> body that it is part of, or "ground".
-        still: place of the former scene -> where it is on the ground, m.
-        idle: loads and springs that are gone, for they do nothing.
-        written: a sentence for each chain that was written out.
+        scene: the new scene.
+        names: body or end of the former scene, "arm" or "arm.tip" -> "hub.arm", "hub.arm_tip", or
+            "ground".
+        into: removed body -> body that it is part of, or "ground".
+        still: body or end of the former scene -> its fixed position, m.
+        idle: removed loads and springs, which have no effect any more.
+        written: a sentence for each expanded chain.
     """
 
     scene: Scene
@@ -56,168 +57,170 @@ class MergedScene:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """A sentence for every body that others became part of."""
-        parts: dict[str, list[str]] = {}
-        for body, whole in self.into.items():
-            parts.setdefault(whole, []).append(body)
-        said = [
-            f"{_called(whole)}: one with {', '.join(gone)}, which are welded to it; "
-            + ", ".join(self._moved(old) for old in self.names if split_reference(old)[0] in gone)
-            for whole, gone in parts.items()
+        """Sentences on expanded chains, merged bodies, and removed loads and springs."""
+        parts_by_whole: dict[str, list[str]] = {}
+        for part, whole in self.into.items():
+            parts_by_whole.setdefault(whole, []).append(part)
+        merged = [
+            f"{_body_text(whole)}: merged with {', '.join(parts)}, which are welded to it; "
+            + ", ".join(
+                self._moved_text(name) for name in self.names if split_reference(name)[0] in parts
+            )
+            for whole, parts in parts_by_whole.items()
         ]
-        return (
-            *self.written,
-            *said,
-            *(f"{what}: left out, for it does nothing now" for what in self.idle),
-        )
+        removed = [f"{element}: left out, it has no effect any more" for element in self.idle]
+        return (*self.written, *merged, *removed)
 
-    def _moved(self, old: str) -> str:
-        if old not in self.still:
-            return f"{old} is {self.names[old]} now"
-        return f"{old} is at [{', '.join(f'{x:.6g}' for x in self.still[old])}] now"
+    def _moved_text(self, name: str) -> str:
+        if name not in self.still:
+            return f"{name} is {self.names[name]} now"
+        return f"{name} is at [{', '.join(f'{x:.6g}' for x in self.still[name])}] now"
 
 
-def _called(whole: str) -> str:
-    return f"the {GROUND}" if whole == GROUND else f'body "{whole}"'
+def _body_text(name: str) -> str:
+    return f"the {GROUND}" if name == GROUND else f'body "{name}"'
 
 
 def merge_welds(scene: Scene, keep: Collection[str] = ()) -> MergedScene | None:
-    """The scene with every weld between rigid bodies, and between these and the ground, gone; None
-    where there is none.  Bodies and hinges to `keep` stay by themselves."""
-    written = expand_chains(scene, [one for one in short(scene) if _welded(one, scene)])
-    found = MergedScene(with_ends_at_mass_centers(_with_bodies(written.scene)))
-    stays = {rename_reference(name, written.names) for name in keep}
+    """Remove all welds between rigid bodies, and to the ground; None if there are none.
+
+    The bodies and hinges `keep` are not removed.
+    """
+    expanded = expand_chains(
+        scene, [chain for chain in expandable_chains(scene) if _has_welds(chain, scene)]
+    )
+    merged = MergedScene(with_ends_at_mass_centers(_with_rigid_bodies(expanded.scene)))
+    kept = {rename_reference(name, expanded.names) for name in keep}
     while True:
-        spoken = referenced_parts(found.scene, stays)
-        bodies = {body.name: body for body in found.scene.body}
-        for weld in found.scene.hinge:
-            gone = _goes(weld, bodies, found.scene, spoken)
-            if gone is not None:
+        referenced = referenced_parts(merged.scene, kept)
+        bodies = {body.name: body for body in merged.scene.body}
+        for weld in merged.scene.hinge:
+            removed = _removable_body(weld, bodies, merged.scene, referenced)
+            if removed is not None:
                 break
         else:
-            return _of_chains(found, written) if found.into else None
-        found = _without(found, weld, gone, bodies)
+            return _with_chain_names(merged, expanded) if merged.into else None
+        merged = _remove_weld(merged, weld, removed, bodies)
 
 
-def _of_chains(found: MergedScene, written: ExpandedScene) -> MergedScene:
-    """What is merged of the scene as it was before its chains were written out."""
-    still = {old: found.still[new] for old, new in written.names.items() if new in found.still}
+def _with_chain_names(merged: MergedScene, expanded: ExpandedScene) -> MergedScene:
+    """The merged scene with names that refer to the scene before its chains were expanded."""
+    still = {old: merged.still[new] for old, new in expanded.names.items() if new in merged.still}
     return replace(
-        found, names=compose_names(written.names, found.names), still={**found.still, **still},
-        written=written.words,
+        merged, names=compose_names(expanded.names, merged.names),
+        still={**merged.still, **still}, written=expanded.words,
     )  # fmt: skip
 
 
-# --- what may go ----------------------------------------------------------------------------------
+# --- which bodies can be removed ----------------------------------------------------------------
 
 
-def _welded(chain: Chain, scene: Scene) -> bool:
-    """Whether members are welded to each other, or something is welded to one."""
+def _has_welds(chain: Chain, scene: Scene) -> bool:
+    """Whether members of a chain are welded to each other, or something is welded to one."""
     return any(hinge.is_weld for hinge in chain.hinge) or any(
         hinge.is_weld and hinge.inboard.startswith(f"{chain.name}[") for hinge in scene.hinge
     )
 
 
-def _with_bodies(scene: Scene) -> Scene:
-    """Flexible bodies that do not deform, welded at one end at least, as bodies."""
-    ends = {
-        split_reference(e)[0] for h in scene.hinge if h.is_weld for e in (h.inboard, h.outboard)
+def _with_rigid_bodies(scene: Scene) -> Scene:
+    """The scene with rigid beams and elastic bodies that have a weld replaced by rigid bodies."""
+    welded = {
+        split_reference(reference)[0]
+        for hinge in scene.hinge
+        if hinge.is_weld
+        for reference in (hinge.inboard, hinge.outboard)
     }
-    stiff = {one.name for one in (*scene.beam, *scene.elastic) if one.model == RIGID} & ends
-    if not stiff:
+    rigid = {body.name for body in (*scene.beam, *scene.elastic) if body.model == RIGID} & welded
+    if not rigid:
         return scene
-    made = substitute_rigid_bodies(scene, {}, stiff).scene
-    slender = {"allow_unphysical_inertia": True}
+    substituted = substitute_rigid_bodies(scene, {}, rigid).scene
+    update = {"allow_unphysical_inertia": True}  # a beam has no inertia about its axis
     return with_tables(
-        made,
+        substituted,
         body=tuple(
-            one.model_copy(update=slender) if one.name in stiff else one for one in made.body
+            body.model_copy(update=update) if body.name in rigid else body
+            for body in substituted.body
         ),
     )
 
 
-def _goes(
-    weld: Hinge, bodies: Mapping[str, Body], scene: Scene, spoken: ReferencedParts
+def _removable_body(
+    weld: Hinge, bodies: Mapping[str, Body], scene: Scene, referenced: ReferencedParts
 ) -> str | None:
-    """The body that becomes part of what a hinge welds it to; None where neither may."""
-    if not weld.is_weld or weld.lets_go or weld.name in spoken.hinges:
+    """Body of a weld that can become part of the other one; None if neither can."""
+    if not weld.is_weld or weld.lets_go or weld.name in referenced.hinges:
         return None
     pair = (weld.outboard_body, weld.inboard_body)
-    if any(name != GROUND and not _rigid(bodies.get(name)) for name in pair):
+    if any(name != GROUND and not _is_rigid(bodies.get(name)) for name in pair):
         return None
-    if any(
-        {split_reference(one.from_)[0], split_reference(one.to)[0]} == {*pair} and _own(one)
-        for one in scene.spring
-    ):
+    if any(_end_bodies(spring) == {*pair} and _is_user_defined(spring) for spring in scene.spring):
         return None
-    if any(
-        {split_reference(one.from_)[0], split_reference(one.to)[0]} & {*pair} - {GROUND}
-        for one in scene.bushing
-    ):
-        return None  # its axes are those of its ends
-    if _closes_on(weld, scene):
+    if any(_end_bodies(bushing) & {*pair} - {GROUND} for bushing in scene.bushing):
+        return None  # the axes of a bushing are those of its ends
+    if _spoils_loop(weld, scene):
         return None
     if weld.inboard_body == GROUND:
-        alone = len(scene.skeleton.bodies) == 1
-        return None if alone or weld.outboard_body in spoken.places else weld.outboard_body
-    return next((name for name in pair if name not in spoken.bodies), None)
+        is_last = len(scene.skeleton.bodies) == 1
+        return None if is_last or weld.outboard_body in referenced.places else weld.outboard_body
+    return next((name for name in pair if name not in referenced.bodies), None)
 
 
-def _closes_on(weld: Hinge, scene: Scene) -> bool:
-    """Whether a loop would have both of its ends on the whole, or one on the ground that nothing
-    there can be."""
+def _end_bodies(element: Any) -> set[str]:
+    """Bodies at the two ends of a spring, bushing or constraint."""
+    return {split_reference(element.from_)[0], split_reference(element.to)[0]}
+
+
+def _spoils_loop(weld: Hinge, scene: Scene) -> bool:
+    """Whether merging spoils a loop: both ends on one body, or outboard end on the ground."""
     pair = {weld.outboard_body, weld.inboard_body}
-    closing = [one for one in scene.hinge if one.name != weld.name]
-    ends = [{one.inboard_body, one.outboard_body} for one in closing]
-    ends += [
-        {split_reference(one.from_)[0], split_reference(one.to)[0]} for one in scene.constraint
-    ]
-    if any(two == pair for two in ends):
+    other_hinges = [hinge for hinge in scene.hinge if hinge.name != weld.name]
+    end_bodies = [{hinge.inboard_body, hinge.outboard_body} for hinge in other_hinges]
+    end_bodies += [_end_bodies(constraint) for constraint in scene.constraint]
+    if pair in end_bodies:
         return True
     part = weld.outboard_body
     return weld.inboard_body == GROUND and (
-        any(one.outboard_body == part for one in closing)
-        or any(
-            part in (split_reference(one.from_)[0], split_reference(one.to)[0])
-            for one in scene.constraint
-        )
+        any(hinge.outboard_body == part for hinge in other_hinges)
+        or any(part in _end_bodies(constraint) for constraint in scene.constraint)
     )
 
 
-def _rigid(body: Body | None) -> bool:
+def _is_rigid(body: Body | None) -> bool:
     return body is not None and body.type == RIGID
 
 
-def _own(spring: Spring) -> bool:
-    """Whether it is a force element of a user's, which may push a body on its own."""
+def _is_user_defined(spring: Spring) -> bool:
+    """Whether it is a user-defined force element, which may act between ends of one body."""
     return spring.type != "spring"
 
 
-# --- one weld -------------------------------------------------------------------------------------
+# --- removal of one weld ------------------------------------------------------------------------
 
 
-def _without(found: MergedScene, weld: Hinge, gone: str, bodies: Mapping[str, Body]) -> MergedScene:
-    """The scene in which a body is part of what it is welded to."""
-    part = bodies[gone]
-    other = weld.inboard_body if gone == weld.outboard_body else weld.outboard_body
+def _remove_weld(
+    merged: MergedScene, weld: Hinge, removed: str, bodies: Mapping[str, Body]
+) -> MergedScene:
+    """Remove a weld and one of its bodies, which becomes part of the other one."""
+    part = bodies[removed]
+    other = weld.inboard_body if removed == weld.outboard_body else weld.outboard_body
     whole = bodies.get(other)
     pose = weld_pose(weld, bodies.get(weld.inboard_body), bodies[weld.outboard_body])
-    if gone != weld.outboard_body:
+    if removed != weld.outboard_body:
         pose = pose.inverse
     places = {gone: pose} | {f"{gone}.{end}": pose.then(end_pose(part, end)) for end in part.ends}
     scene = with_tables(
-        found.scene, hinge=tuple(one for one in found.scene.hinge if one.name != weld.name)
+        merged.scene, hinge=tuple(hinge for hinge in merged.scene.hinge if hinge.name != weld.name)
     )
-    scene = with_axes_of(scene, gone, INERTIAL if whole is None else whole.name, pose.rotation)
+    scene = with_load_axes(scene, removed, INERTIAL if whole is None else whole.name, pose.rotation)
     if whole is None:
-        return _grounded(found, scene, gone, places)
-    return _joined(found, scene, whole, part, places)
+        return _merge_into_ground(merged, scene, removed, poses)
+    return _merge_into_body(merged, scene, whole, part, poses)
 
 
-def _joined(
-    found: MergedScene, scene: Scene, whole: Body, part: Body, places: Mapping[str, Pose]
+def _merge_into_body(
+    merged: MergedScene, scene: Scene, whole: Body, part: Body, poses: Mapping[str, Pose]
 ) -> MergedScene:
-    """The scene in which one body is part of another."""
+    """Merge a body into another one; `poses` are those of its origin and ends in that body."""
     ends, names = dict(whole.ends), {}
     for old, pose in places.items():
         own = _free_name(ends, old.replace(".", "_"))
@@ -229,71 +232,74 @@ def _joined(
     return _gone(found, made, part.name, whole.name, names)
 
 
-def _free_name(ends: Collection[str], name: str) -> str:
+def _unused_name(ends: Collection[str], name: str) -> str:
     while name in ends:
         name += "_"
     return name
 
 
-def _gone(
-    found: MergedScene, scene: Scene, part: str, whole: str, names: Mapping[str, str]
+def _record_removal(
+    merged: MergedScene, scene: Scene, part: str, whole: str, names: Mapping[str, str]
 ) -> MergedScene:
-    """What is known after one more body is gone."""
-    into = {body: whole if target == part else target for body, target in found.into.items()}
-    former = {old: names.get(new, new) for old, new in found.names.items()}
-    idle = [one for one in scene.spring if _within(one)]
+    """The merged scene after one more body has been removed."""
+    into = {body: whole if target == part else target for body, target in merged.into.items()}
+    former = {old: names.get(new, new) for old, new in merged.names.items()}
+    idle = [spring for spring in scene.spring if _is_on_one_body(spring)]
     return replace(
-        found,
-        scene=with_tables(scene, spring=tuple(one for one in scene.spring if one not in idle)),
+        merged,
+        scene=with_tables(scene, spring=tuple(s for s in scene.spring if s not in idle)),
         names={**former, **names}, into={**into, part: whole},
-        idle=(*found.idle, *(f'spring "{one.name}"' for one in idle)),
+        idle=(*merged.idle, *(f'spring "{spring.name}"' for spring in idle)),
     )  # fmt: skip
 
 
-def _within(spring: Spring) -> bool:
-    """Whether both of its ends are on one body, or on the ground."""
-    return split_reference(spring.from_)[0] == split_reference(spring.to)[0]
+def _is_on_one_body(spring: Spring) -> bool:
+    """Whether both ends of a spring are on the same body, or on the ground."""
+    return len(_end_bodies(spring)) == 1
 
 
-# --- the ground -----------------------------------------------------------------------------------
+# --- merging into the ground --------------------------------------------------------------------
 
 
-def _grounded(
-    found: MergedScene, scene: Scene, gone: str, places: Mapping[str, Pose]
+def _merge_into_ground(
+    merged: MergedScene, scene: Scene, removed: str, poses: Mapping[str, Pose]
 ) -> MergedScene:
-    """The scene in which a body is part of the ground."""
-    idle = [load for load in scene.load if _on(load, gone)]
-    made = with_tables(
+    """Merge a body into the ground; `poses` are those of its origin and ends on the ground."""
+    idle = [load for load in scene.load if _acts_on(load, removed)]
+    changed = with_tables(
         scene,
-        body=tuple(one for one in scene.body if one.name != gone),
-        hinge=tuple(_hung(one, one.rotation, places) for one in scene.hinge),
-        chain=tuple(_hung(one, _first_turn(one), places) for one in scene.chain),
-        spring=tuple(_held(one, places) for one in scene.spring),
-        load=tuple(one for one in scene.load if one not in idle),
+        body=tuple(body for body in scene.body if body.name != removed),
+        hinge=tuple(_attached_to_ground(hinge, hinge.rotation, poses) for hinge in scene.hinge),
+        chain=tuple(
+            _attached_to_ground(chain, _first_rotation(chain), poses) for chain in scene.chain
+        ),
+        spring=tuple(_spring_to_ground(spring, poses) for spring in scene.spring),
+        load=tuple(load for load in scene.load if load not in idle),
     )
-    # ends of other bodies that became ends of this one are on the ground with it
-    still = {old: pose.position for old, pose in places.items()}
-    still |= {old: still[new] for old, new in found.names.items() if new in still}
-    after = _gone(found, made, gone, GROUND, dict.fromkeys(places, GROUND))
-    said = tuple(f'load "{one.name}"' for one in idle)
-    return replace(after, still={**found.still, **still}, idle=(*said, *after.idle))
+    # Ends of other bodies that became ends of this one are fixed on the ground, too.
+    still = {old: pose.position for old, pose in poses.items()}
+    still |= {old: still[new] for old, new in merged.names.items() if new in still}
+    names = dict.fromkeys(poses, GROUND)
+    after = _record_removal(merged, changed, removed, GROUND, names)
+    idle_loads = tuple(f'load "{load.name}"' for load in idle)
+    return replace(after, still={**merged.still, **still}, idle=(*idle_loads, *after.idle))
 
 
-def _on(load: Load, body: str) -> bool:
+def _acts_on(load: Load, body: str) -> bool:
     return split_reference(load.on)[0] == body
 
 
-def _first_turn(chain: Chain) -> Matrix:
-    """Rotation of the first hinge of a chain."""
-    given = chain.orientation
-    return chain.hinge[0].rotation if given is None else from_orientation(given)
+def _first_rotation(chain: Chain) -> Matrix:
+    """Rotation matrix of the first hinge of a chain."""
+    orientation = chain.orientation
+    return chain.hinge[0].rotation if orientation is None else from_orientation(orientation)
 
 
-def _hung(element: Any, rotation: Matrix, places: Mapping[str, Pose]) -> Any:
-    """A hinge or a chain that hangs on the ground where the end was that it hung on."""
-    if element.inboard not in places:
+def _attached_to_ground(element: Any, rotation: Matrix, poses: Mapping[str, Pose]) -> Any:
+    """A hinge or chain whose inboard end moves to the ground, at the same pose."""
+    if element.inboard not in poses:
         return element
-    held = places[element.inboard]
+    pose = poses[element.inboard]
     return element.model_copy(
         update={
             "inboard": GROUND, "position": held.position,
@@ -302,10 +308,10 @@ def _hung(element: Any, rotation: Matrix, places: Mapping[str, Pose]) -> Any:
     )  # fmt: skip
 
 
-def _held(spring: Spring, places: Mapping[str, Pose]) -> Spring:
-    """A spring to the place on the ground where its end was."""
+def _spring_to_ground(spring: Spring, poses: Mapping[str, Pose]) -> Spring:
+    """A spring whose end moves to the ground, at the same point."""
     for key in ("from_", "to"):
-        pose = places.get(getattr(spring, key))
+        pose = poses.get(getattr(spring, key))
         if pose is not None:
             spring = spring.model_copy(update={key: GROUND, "position": pose.position})
     return spring
