@@ -1,1 +1,1 @@
-"""Atlas of failures: where methods fail, measured in every run, and remedies that hold."""
+"""Failure atlas: parameter values at which numerical methods fail, and remedies."""

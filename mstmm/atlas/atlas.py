@@ -11,7 +11,7 @@ from typing import Any
 from ..argument_validation import abbreviate
 from ..errors import EnvironmentFailure, SceneError
 from ..runtime.platform_support.safe_files import write_text
-from . import cases as known
+from . import cases as case_registry
 from .case_plot import MeasuredCase, measure_case
 
 #: Values of the coarse grid, and relative width of the last bracket.
@@ -84,7 +84,7 @@ def stability(
     if not 0 < tolerance < 1:
         raise SceneError(f"tolerance = {tolerance!r}: expected a number between 0 and 1")
     measured_cases = []
-    definitions = known.select_cases(None if cases is None else list(cases))
+    definitions = case_registry.select_cases(None if cases is None else list(cases))
     if cases is None:
         definitions = tuple(definition for definition in definitions if not definition.lacks)
     for number, definition in enumerate(definitions):

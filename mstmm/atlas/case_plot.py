@@ -40,7 +40,7 @@ def measure_case(case: CaseDefinition, points: int, tolerance: float) -> Measure
         bracket = find_frontier(method, values, case.scale, tolerance)
         assert bracket.fails_at is not None
         for value in values:
-            remedy.holds(value)  # for the plot
+            remedy.holds(value)  # adds a point to the plot
         remedy_values = case.scale.grid(bracket.fails_at, case.reach, points)
         remedy_bracket = find_end(remedy, remedy_values, case.scale, tolerance)
     except NumericalFailure as error:

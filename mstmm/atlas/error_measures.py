@@ -112,7 +112,7 @@ def bending_error(
 def root_inertia(z: float) -> float:
     """Inertia at the root of a vibrating beam of length and stiffness 1 at beta L = z.
 
-    It is computed as in runs.
+    It is computed with the dynamic stiffness that harmonic analyses use.
     """
     beam = Direction(True, 1.0, 0.0, 1.0, np.eye(4))
     s, stiffness_factor = np.array([1j * z**2]), np.ones(1, dtype=np.complex128)

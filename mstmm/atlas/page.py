@@ -86,9 +86,11 @@ def _section(case: CaseResult, pictures: bool) -> str:
 
 
 def _result_list(case: CaseResult) -> str:
-    remark = "" if case.monotone else "; beyond it holds in places, by chance"
+    remark = "" if case.monotone else "; beyond it holds at some values by chance"
     end = case.remedy_fails_at
-    end_text = "the end of the range" if end is None else f"fails at {format_number(end, 4)}"
+    end_text = (
+        "the end of the measured range" if end is None else f"fails at {format_number(end, 4)}"
+    )
     return (
         f"- measured: {case.measured}; a failure above {limit_text(case)}\n"
         f"- {case.method}: holds at {format_number(case.holds_at, 4)}, fails at "

@@ -41,8 +41,8 @@ _MIN_LOG_RATIO = 10.0
 #: text above them.
 _SPACE_BELOW, _DATA_HEIGHT, _ARROW_POSITION, _TEXT_POSITION = 0.05, 0.73, 0.84, 0.865
 
-#: Number of letters that fit on a line of the legend.
-_MAX_LEGEND_LETTERS = 80
+#: Number of characters that fit on a line of the legend.
+_MAX_LEGEND_CHARACTERS = 80
 
 
 def draw_case(case: CaseResult, path: Path | None) -> Any:
@@ -87,7 +87,7 @@ def _draw_axis(axis: Any, case: CaseResult) -> None:
     if any(_is_off_scale(measured) for _, measured in all_points):
         handles += axis.plot([], [], color="#777777", marker=10, linestyle="none", markersize=5,
                              label="no answer, or far above")  # fmt: skip
-    is_wide = sum(len(handle.get_label()) for handle in handles) > _MAX_LEGEND_LETTERS
+    is_wide = sum(len(handle.get_label()) for handle in handles) > _MAX_LEGEND_CHARACTERS
     axis.figure.legend(
         handles=handles, loc="outside lower center", ncols=2 if is_wide else 3, handlelength=1.4,
         columnspacing=1.2, fontsize=8,
@@ -121,12 +121,12 @@ def _set_value_axis(axis: Any, points: Points, limit: float) -> None:
         )
 
 
-def _label_frontier(axis: Any, at: float) -> None:
+def _label_frontier(axis: Any, value: float) -> None:
     """Label the frontier with its parameter, at the top, on the side with more space."""
     axis.autoscale_view()  # otherwise the transformation is that of an empty axis
-    left, _ = axis.transAxes.inverted().transform(axis.transData.transform((at, 1.0)))
+    left, _ = axis.transAxes.inverted().transform(axis.transData.transform((value, 1.0)))
     axis.annotate(
-        f"fails at {format_number(at)}", (at, 0.985), xycoords=("data", "axes fraction"),
+        f"fails at {format_number(value)}", (value, 0.985), xycoords=("data", "axes fraction"),
         xytext=(-4 if left > 0.5 else 4, 0), textcoords="offset points", color=_FAILURE_COLOUR,
         ha="right" if left > 0.5 else "left", va="top",
     )  # fmt: skip
@@ -156,16 +156,16 @@ def _is_off_scale(measured: float) -> bool:
     return not measured <= _MAX_DRAWN
 
 
-def _draw_curve(axis: Any, points: Points, **look: Any) -> None:
+def _draw_curve(axis: Any, points: Points, **style: Any) -> None:
     """Draw a line through the measured values, and arrows where there is no answer."""
     shown = [(parameter, max(m, _MIN_DRAWN)) for parameter, m in points if not _is_off_scale(m)]
-    axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **look)
+    axis.plot(*zip(*shown, strict=True), linewidth=1.6, markersize=3.5, **style)
     off_scale = [parameter for parameter, m in points if _is_off_scale(m)]
     axis.plot(
         off_scale,
         [_ARROW_POSITION] * len(off_scale),
         transform=axis.get_xaxis_transform(),
-        color=look["color"],
+        color=style["color"],
         marker=10,
         linestyle="none",
         markersize=5,

@@ -46,7 +46,7 @@ def test_bad_input_is_told_in_a_line(mstmm: Command, folder: Path) -> None:
         (("--case", "product-angle"), "--out DIR"),
         (("--out", ""), "expected the name of a folder"),
         (("--out", "pendulum.toml"), "not a folder"),
-        (("--list", "--case", "none"), "no such case"),
+        (("--list", "--case", "none"), "unknown case"),
     ):
         done = mstmm("stability", *arguments)
         assert (done.code, says in done.err) == (2, True), done.err

@@ -29,17 +29,17 @@ def case_names() -> tuple[str, ...]:
     return tuple(_modules_by_name())
 
 
-def select_cases(wanted: Sequence[str] | None) -> tuple[CaseDefinition, ...]:
+def select_cases(names: Sequence[str] | None) -> tuple[CaseDefinition, ...]:
     """Definitions of the cases of these names, without duplicates; default: all cases.
 
     Raises SceneError, with the nearest name, for an unknown name.
     """
-    files = _modules_by_name()
-    for name in wanted or ():
-        if name not in files:
+    modules = _modules_by_name()
+    for name in names or ():
+        if name not in modules:
             raise SceneError(
-                f'case "{name:.60}": there is no such case{did_you_mean(name, files)} '
-                "(mstmm stability --list shows all)"
+                f'case "{name:.60}": unknown case{did_you_mean(name, modules)} '
+                "(mstmm stability --list shows all cases)"
             )
-    selected = dict.fromkeys(wanted or files)
-    return tuple(import_module(files[name], __name__).CASE for name in selected)
+    selected = dict.fromkeys(names or modules)
+    return tuple(import_module(modules[name], __name__).CASE for name in selected)

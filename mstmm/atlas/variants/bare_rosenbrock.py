@@ -36,7 +36,7 @@ class BareRosenbrock:
         assert isinstance(table, Rosenbrock) and table.E is not None
         self._table, self._estimate = table, table.E[:-1]
         self._base, self._stage = TangentMatrix(model.looped), TangentMatrix(model.looped)
-        self._late = table.d if time_slope else np.zeros_like(table.d)
+        self._time_coefficients = table.d if time_slope else np.zeros_like(table.d)
         q, u = model.initial_state()
         udot = model.accelerations(q, u) if accelerations is None else accelerations
         self._start = np.array([q, u, udot])
@@ -85,7 +85,7 @@ class BareRosenbrock:
             stage_state = y + np.tensordot(table.A[i], stages, 1)
             right = (
                 -self._stage.residual(t + table.C[i] * h, *stage_state)
-                - self._late[i] * h * time_derivative
+                - self._time_coefficients[i] * h * time_derivative
             )
             q, u = stage_state[1:] + np.tensordot(table.second[i], stages[:, :2], 1) / h
             x = tangent.solve(right, q / s, -u)

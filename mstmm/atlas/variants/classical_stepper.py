@@ -15,7 +15,7 @@ from ...runtime.model.model import Model
 
 
 class ClassicalSteps:
-    """Classical steps from a model's start, by Riccati; `stepper` may be modified."""
+    """Classical steps from the initial state of a model; `stepper` may be modified."""
 
     def __init__(self, model: Model, scheme: Scheme, iterations: int = 1) -> None:
         engine, (self.q, u) = model.looped, model.initial_state()
@@ -29,7 +29,7 @@ class ClassicalSteps:
         self._states = StateConversion(engine.packed, parts, form, self.q)
 
     def advance(self, step: float, steps: int = 1) -> Array:
-        """Advance by `steps` steps (s) and return q (nq,).  NumericalFailure if one fails."""
+        """Advance by `steps` steps (s); return q (nq,).  NumericalFailure if a step fails."""
         states = self.stepper.advance(steps, step)
         if len(states) < steps:
             raise NumericalFailure(f"a step fails with code {self.stepper.run.failure}")

@@ -31,7 +31,7 @@ def accelerations(
         rates: (n,) speeds of the pins, rad/s.
         gravity: (3,), m/s^2.
     """
-    sweep, rigid = _Kernels("sweep", "generic1"), _Kernels("body", "rigid")
+    sweep, rigid_body = _Kernels("sweep", "generic1"), _Kernels("body", "rigid")
     n, zero_vector, subspace = len(rates), _ZEROS[:3], np.concatenate([_ZEROS[:3], pin])
     steps = np.diff(points, axis=0, prepend=np.zeros((1, 3)))
     motion, udot = np.zeros((n + 1, _MOTION_LENGTH)), np.zeros((n, 1))
@@ -57,9 +57,9 @@ def accelerations(
             ),
             (unused, unused[:3], motion[i]),
         )
-        numbers = _rotated_inertia(body, axes[i])
-        rigid("inertia", (numbers,), (S[i],))
-        rigid("bias_load", (numbers, motion[i]), (e[i],))
+        inertia_inputs = _rotated_inertia(body, axes[i])
+        rigid_body("inertia", (inertia_inputs,), (S[i],))
+        rigid_body("bias_load", (inertia_inputs, motion[i]), (e[i],))
     for i in reversed(range(n)):
         sweep("condense", (_IDENTITY, steps[i], subspace, _ZEROS[:1], _ZEROS[:2], S[i], e[i],
                            _ZEROS[:1]), (gains[i], terms[i], S[i - 1], e[i - 1]))  # fmt: skip
@@ -88,11 +88,11 @@ class _Kernels:
             prebuilt_kernels.text(self._ffi, record.name): record.call for record in records
         }
 
-    def __call__(self, kernel: str, given: tuple[Array, ...], taken: tuple[Array, ...]) -> None:
+    def __call__(self, kernel: str, inputs: tuple[Array, ...], outputs: tuple[Array, ...]) -> None:
         """Call a kernel.  Raises NumericalFailure if a guard is violated."""
-        code = self._calls[kernel](0, self._pointers(given), self._pointers(taken))
+        code = self._calls[kernel](0, self._pointers(inputs), self._pointers(outputs))
         if code:
-            raise NumericalFailure(f"{kernel} in inertial axes: guard {code}")
+            raise NumericalFailure(f"kernel {kernel} in inertial axes: guard {code} violated")
 
     def _pointers(self, arrays: tuple[Array, ...]) -> Any:
         return [self._ffi.from_buffer("double[]", np.ascontiguousarray(array)) for array in arrays]

@@ -15,18 +15,18 @@ from ...runtime.model.model import Model
 _CONVERGENCE_TOLERANCE = 1e-8
 
 
-def mean_iterations(model: Model, step: float, steps: int, most: int) -> float:
+def mean_iterations(model: Model, step: float, steps: int, max_count: int) -> float:
     """Mean number of iterations per step, for `steps` steps (s) from the start.
 
     For scenes whose speeds are the rates of their coordinates.  Raises NumericalFailure if a step
-    needs more than `most`.
+    needs more than `max_count`.
     """
     tangent, iteration_count, rate = TangentMatrix(model.looped), 0, 2.0 / step
     q, u = model.initial_state()
     a = model.accelerations(q, u)
     for number in range(1, steps + 1):
         q, u, speed = q + step * u + step**2 / 2 * a, u + step * a, u
-        for _ in range(most):
+        for _ in range(max_count):
             iteration_count += 1
             residual = tangent.residual(number * step, q, u, a)
             tangent.factor_laws(rate, rate)
@@ -35,5 +35,5 @@ def mean_iterations(model: Model, step: float, steps: int, most: int) -> float:
             if np.abs(change).max() <= _CONVERGENCE_TOLERANCE * rate * np.abs(u - speed).max():
                 break
         else:
-            raise NumericalFailure(f"step {number}: not converged after {most} iterations")
+            raise NumericalFailure(f"step {number}: not converged after {max_count} iterations")
     return iteration_count / steps

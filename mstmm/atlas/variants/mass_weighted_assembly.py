@@ -24,14 +24,15 @@ class MassWeightedAssembly(Assembly):
         return 1.0 / mobility
 
 
-def nearest_pose(model: Model, q: Array, held: str, by_masses: bool) -> dict[str, float]:
+def nearest_pose(model: Model, q: Array, fixed_hinge: str, by_masses: bool) -> dict[str, float]:
     """Final hinge coordinates of the assembly of loops that cannot close, near q (nq,).
 
-    The hinge `held` is fixed; for hinges of one coordinate.  ValueError if the loops close.
+    The hinge `fixed_hinge` does not move; for hinges of one coordinate.  Raises ValueError if the
+    loops close.
     """
     assembly_class = MassWeightedAssembly if by_masses else Assembly
     try:
-        assembly_class(model.looped, q, [held]).positions(q)
+        assembly_class(model.looped, q, [fixed_hinge]).positions(q)
     except LoopClosureError as error:
         return {name: coordinates[0] for name, coordinates in error.pose.items()}
-    raise ValueError("the loops close")
+    raise ValueError("nearest_pose: expected loops that cannot close, they close")

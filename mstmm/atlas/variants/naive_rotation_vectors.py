@@ -1,7 +1,7 @@
 """Rotation vectors with a truncated rate, in the extreme the angular velocity.
 
 Within a step an attitude is q exp(theta), and theta' = w + theta x w / 2 + theta x (theta x w) / 12
-up to the third power of theta (H. Munthe-Kaas, BIT 38 (1998) 92-111).  Here products are left out.
+up to the third power of theta (H. Munthe-Kaas, BIT 38 (1998) 92-111).  Here products are omitted.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def rotate(attitude: Array, theta: Array) -> Array:
 
 
 def rotation_vector_rate(theta: Array, u: Array, products: int = 2) -> Array:
-    """Rate (3,) of a rotation vector at an angular velocity, with 0 to 2 of its products."""
+    """Rate (3,) of a rotation vector at an angular velocity, with 0 to 2 of these products."""
     cross_product = np.cross(theta, u)
     rate = np.asarray(u, float)
     if products > 0:
@@ -34,9 +34,9 @@ def final_attitude(model: Model, step: float, steps: int, products: int = 0) -> 
     attitude, speeds = model.initial_state()
     for _ in range(steps):
         stages: list[tuple[Array, Array]] = []
-        for part in (0.0, 0.5, 0.5, 1.0):
+        for fraction in (0.0, 0.5, 0.5, 1.0):
             rate, acceleration = stages[-1] if stages else (np.zeros(3), np.zeros(3))
-            theta, u = part * step * rate, speeds + part * step * acceleration
+            theta, u = fraction * step * rate, speeds + fraction * step * acceleration
             stages.append(
                 (
                     rotation_vector_rate(theta, u, products),

@@ -1,4 +1,4 @@
-"""Estimate of the fastest motion of a row of bodies from the pivots of the sweep."""
+"""Estimate of the fastest motion of a chain of bodies from the pivots of the sweep."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from ...shared_scenes import compile_looped
 
 @cache
 def _tip_position(load: float, pieces: int, shapes: int) -> Array:
-    """Static tip position of a clamped beam of 1 m and 1 N m2 under a load across it (N)."""
+    """Static tip position of a clamped beam of 1 m and 1 N m2 under a transverse tip load (N)."""
     beam = {
         "length": 1 / pieces, "mass_per_length": 1.0, "bending_stiffness": 1.0,
         "modes": {"y": shapes},

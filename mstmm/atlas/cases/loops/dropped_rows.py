@@ -18,7 +18,7 @@ RANK_THRESHOLD = 1e-6
 def _error(ratio: float, by_masses: bool) -> float:
     try:
         linkage = compile_looped(four_bar(ratio=ratio))
-    except SceneError as error:  # no digits are left
+    except SceneError as error:  # all digits are lost
         raise NumericalFailure(str(error)) from None
     q, u = linkage.initial_state()
     udot = linkage.accelerations(q, u)[:3]

@@ -25,10 +25,10 @@ def _lift(pairs: int) -> MechanismGraph:
     )
 
 
-def _mean_work(pairs: float, grown: Callable[[MechanismGraph], Tree]) -> float:
-    """Mean work per hinge of a body."""
+def _mean_work(pairs: float, build_tree: Callable[[MechanismGraph], Tree]) -> float:
+    """Mean number of pairs of rows per hinge of the tree."""
     lift = _lift(int(pairs))
-    return total_cost(lift, grown(lift)) / lift.bodies
+    return total_cost(lift, build_tree(lift)) / lift.bodies
 
 
 CASE = CaseDefinition(

@@ -15,7 +15,7 @@ ROD_COUNT = 5
 def _error(ratio: float, refined: bool) -> float:
     try:
         arch = compile_looped(rod_arch([1.0, 1.0, 1.0, ratio, 1.0]))
-    except SceneError as error:  # no digits are left
+    except SceneError as error:  # all digits are lost
         raise NumericalFailure(str(error)) from None
     arch.packed.model.refines = int(refined)
     return rounding_error(arch, [arch.initial_state()])

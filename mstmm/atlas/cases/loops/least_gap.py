@@ -26,7 +26,7 @@ def _linkage(spread: float) -> Model:
 
 
 def _error(spread: float, by_masses: bool) -> float:
-    """Relative excess of the gap; the least gap has coupler and rocker on the line of the pins."""
+    """Relative excess of the gap; at the least gap coupler and rocker are in line."""
     linkage = _linkage(spread)
     q = linkage.initial_state()[0]
     hinges = linkage.layout.hinges
@@ -34,13 +34,13 @@ def _error(spread: float, by_masses: bool) -> float:
     q[hinges["knee"].q_slice] += COUPLER_OFFSET
     pose = nearest_pose(linkage, q, "foot", by_masses)
     knee = [CRANK * math.cos(CRANK_ANGLE), CRANK * math.sin(CRANK_ANGLE)]
-    least = math.dist(knee, (FOOT_DISTANCE, 0.0)) - COUPLER - ROCKER
+    least_gap = math.dist(knee, (FOOT_DISTANCE, 0.0)) - COUPLER - ROCKER
     coupler_angle = CRANK_ANGLE + pose["knee"]
     tips = (
         (knee[0] + COUPLER * math.cos(coupler_angle), knee[1] + COUPLER * math.sin(coupler_angle)),
         (FOOT_DISTANCE + ROCKER * math.cos(pose["heel"]), ROCKER * math.sin(pose["heel"])),
     )
-    return math.dist(*tips) / least - 1.0
+    return math.dist(*tips) / least_gap - 1.0
 
 
 CASE = CaseDefinition(

@@ -23,11 +23,11 @@ def _linkage(askew: float) -> Model:
         raise NumericalFailure(str(error)) from None
 
 
-def _error(found: Array) -> float:
+def _error(udot: Array) -> float:
     """Relative error against the linkage with parallel axes."""
     aligned = _linkage(0.0)
-    exact = aligned.accelerations(*aligned.initial_state())[: len(found)]
-    return float(np.abs(found - exact).max() / np.abs(exact).max())
+    exact = aligned.accelerations(*aligned.initial_state())[: len(udot)]
+    return float(np.abs(udot - exact).max() / np.abs(exact).max())
 
 
 def _error_with_all_rows(askew: float) -> float:

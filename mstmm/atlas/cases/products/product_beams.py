@@ -23,9 +23,9 @@ def _error(count: float, method: str) -> float:
          "inboard": f"beam{i - 1}.tip" if i else "ground"}
         for i in range(int(count))
     ]  # fmt: skip
-    row = compile_looped({"gravity": [0, -9.81, 0], "beam": beams, "hinge": welds})
-    expected = simulate_to_end(row, STEPS * STEP, "dttmm", STEP).q[-1]
-    computed = simulate_to_end(row, STEPS * STEP, method, STEP).q[-1]
+    model = compile_looped({"gravity": [0, -9.81, 0], "beam": beams, "hinge": welds})
+    expected = simulate_to_end(model, STEPS * STEP, "dttmm", STEP).q[-1]
+    computed = simulate_to_end(model, STEPS * STEP, method, STEP).q[-1]
     return float(np.abs(computed - expected).max() / np.abs(expected).max())
 
 

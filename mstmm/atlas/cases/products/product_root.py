@@ -14,8 +14,8 @@ ROD_COUNT = 8
 
 
 def _error(ratio: float, **options: Any) -> float:
-    row = compile_looped(rod_chain([ratio] + [1.0] * (ROD_COUNT - 1)), **options)
-    return refinement_correction(row, random_pin_states(ROD_COUNT))
+    model = compile_looped(rod_chain([ratio] + [1.0] * (ROD_COUNT - 1)), **options)
+    return refinement_correction(model, random_pin_states(ROD_COUNT))
 
 
 CASE = CaseDefinition(

@@ -48,10 +48,10 @@ def _exact() -> Array:
     return simulate_to_end(_two_rods(), T_END, rtol=1e-11, atol=1e-13, output_times=[T_END]).q[-1]
 
 
-def _error(rate: float, plain: bool) -> float:
+def _error(rate: float, additive: bool) -> float:
     steps = round(T_END * SPIN / rate)
     step = T_END / steps
-    if plain:
+    if additive:
         coordinates = additive_rotations.final_coordinates(_two_rods(), step, steps, RADIUS)
     else:
         coordinates = simulate_to_end(

@@ -18,9 +18,9 @@ def _iterations_with_laws(rate: float) -> float:
 
 def _iterations_with_choice(rate: float) -> float:
     run = simulate_to_end(hanging_rod(rate / STEP), STEPS * STEP, "newmark", STEP, tangent="laws")
-    counted = run.statistics
-    assert counted is not None
-    return counted.iterations / counted.steps
+    statistics = run.statistics
+    assert statistics is not None
+    return statistics.iterations / statistics.steps
 
 
 CASE = CaseDefinition(

@@ -13,11 +13,11 @@ from ...variants.bare_rosenbrock import BareRosenbrock
 T_END = 0.5
 
 
-def _error(step: float, old: bool) -> float:
+def _error(step: float, use_old: bool) -> float:
     rods, steps = double_pendulum(), round(T_END / step)
     step = T_END / steps
     exact = simulate_to_end(rods, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
-    if old:
+    if use_old:
         angles = BareRosenbrock(rods, "rodas5p", accelerations=np.zeros(2)).fixed(step, steps)[
             -1, 0
         ]

@@ -12,10 +12,10 @@ from ...shared_scenes import compile_looped
 STEP, PHASE_COUNT = 0.01, 40
 
 
-def _rebound(rate: float, fixed: bool) -> float:
+def _rebound(rate: float, fixed_step: bool) -> float:
     """Energy of 1 kg after a stop, relative to that before, at 1 m/s.
 
-    It is the largest over PHASES instants within a step at which the contact starts.
+    It is the largest over PHASE_COUNT instants within a step at which the contact starts.
     """
     stop = {"lower": 0.0, "stiffness": (rate / STEP) ** 2, "damping": 0.0}
     slide = {
@@ -28,7 +28,7 @@ def _rebound(rate: float, fixed: bool) -> float:
     speeds = []
     for phase in np.arange(PHASE_COUNT) / PHASE_COUNT:
         start = [STEP * (1 + phase)], [-1.0]
-        settings = {"step": STEP} if fixed else {"rtol": 1e-6, "atol": 1e-9}
+        settings = {"step": STEP} if fixed_step else {"rtol": 1e-6, "atol": 1e-9}
         run = simulate_to_end(mass_model, t_end, "genalpha", initial=start, **settings)
         speeds.append(float(run.u[-1, 0]))
     return max(speeds) ** 2

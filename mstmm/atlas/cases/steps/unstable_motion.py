@@ -23,14 +23,14 @@ def _inverted_rod(weight: float) -> dict[str, object]:
     return {"gravity": [-weight, 0, 0], "body": [rod("rod")], "hinge": [pin]}
 
 
-def _error(rate: float, fixed: bool) -> float:
+def _error(rate: float, fixed_step: bool) -> float:
     """Relative error; `rate` is the step times the growth rate of an inverted rod on its pin."""
     unit_model = compile_looped(_inverted_rod(1.0))
     slope = float(unit_model.derivatives(np.zeros(1), np.zeros(1)).q[0, 0])
     falling = compile_looped(_inverted_rod((rate / STEP) ** 2 / slope))
     t_end = max(1, round(TIME_CONSTANTS / rate)) * STEP
     exact = simulate_to_end(falling, t_end, rtol=1e-11, atol=1e-22, output_times=[t_end]).q
-    if fixed:
+    if fixed_step:
         angles = simulate_to_end(falling, t_end, "genalpha", STEP, output_times=[t_end]).q
     else:
         angles = simulate_to_end(

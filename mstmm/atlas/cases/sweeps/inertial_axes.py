@@ -18,15 +18,16 @@ from ...shared_scenes import (
 )
 from ...variants import inertial_axes
 
-#: Along the rods at rest, across them in their plane, and along the pins.
+#: Directions of the rods at rest and of the pins.
 ROD_AXIS, PIN_AXIS = (
     np.array([5.0, -4.0, 1.0]) / np.sqrt(42.0),
     np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0),
 )
+#: Columns: along the rods, normal to them in their plane, along the pins.
 PLANE = np.stack([ROD_AXIS, np.cross(PIN_AXIS, ROD_AXIS), PIN_AXIS], axis=1)
 WEIGHT = -9.81 * PLANE[:, 1]
 
-#: Moments of inertia about the mass centre, and mass, first moments and moments about the pin.
+#: Moments of inertia about the mass centre; mass, first moments and moments about the pin.
 MOMENTS = np.diag([ROD_AXIAL_INERTIA, ROD_TRANSVERSE_INERTIA, ROD_TRANSVERSE_INERTIA])
 BODY_NUMBERS = np.array(
     [
@@ -45,7 +46,7 @@ BODY_NUMBERS = np.array(
 
 
 def _scene(rods: int) -> dict[str, object]:
-    """Scene of rods along ALONG, given in inertial axes."""
+    """Scene of rods along ROD_AXIS, given in inertial axes."""
     tensor = PLANE @ MOMENTS @ PLANE.T
     body = {
         "mass": 1.0, "center_of_mass": (ROD_AXIS / 2).tolist(),

@@ -31,21 +31,24 @@ def _body_chain(masses: Array, springs: Array) -> Model:
     return compile_looped({"gravity": [0, 0, 0], "body": bodies, "hinge": hinges})
 
 
-def _exact(masses: Array, springs: Array) -> float:
+def _exact_rate(masses: Array, springs: Array) -> float:
     """Exact |lambda| of the fastest motion, from displacements relative to the ground."""
     stretch = np.eye(BODY_COUNT) - np.eye(BODY_COUNT, k=-1)
-    weighed = np.sqrt(springs)[:, None] * stretch / np.sqrt(masses)
-    return float(np.linalg.norm(weighed, 2))
+    weighted = np.sqrt(springs)[:, None] * stretch / np.sqrt(masses)
+    return float(np.linalg.norm(weighted, 2))
 
 
-def _underestimation(ratio: float, found: Callable[[Model], float]) -> float:
-    light = np.arange(BODY_COUNT) % 2 == 0
-    masses, springs = np.where(light, 1.0, ratio), np.where(light, SOFT_STIFFNESS, HIGH_STIFFNESS)
-    return _exact(masses, springs) / found(_body_chain(masses, springs))
+def _underestimation(ratio: float, estimate: Callable[[Model], float]) -> float:
+    is_light = np.arange(BODY_COUNT) % 2 == 0
+    masses, springs = (
+        np.where(is_light, 1.0, ratio),
+        np.where(is_light, SOFT_STIFFNESS, HIGH_STIFFNESS),
+    )
+    return _exact_rate(masses, springs) / estimate(_body_chain(masses, springs))
 
 
-def _rate_by_iterations(row: Model) -> float:
-    return fastest_at_start(row.looped, 0.0, *row.initial_state())
+def _rate_by_iterations(model: Model) -> float:
+    return fastest_at_start(model.looped, 0.0, *model.initial_state())
 
 
 CASE = CaseDefinition(

@@ -13,7 +13,7 @@ from ...error_measures import rounding_error
 from ...parameter_scale import LOG_SCALE
 from ...shared_scenes import ROD_TRANSVERSE_INERTIA, compile_looped
 
-#: Along the rod, in the axes of its body, and two directions across it.
+#: Direction of the rod in the axes of its body, and two directions normal to it.
 ROD_AXIS = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
 FIRST_NORMAL = np.array([3.0, 0.0, -1.0]) / np.sqrt(10.0)
 SECOND_NORMAL = np.cross(ROD_AXIS, FIRST_NORMAL)
