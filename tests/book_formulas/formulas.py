@@ -197,13 +197,16 @@ PRINTED_FORMULAS: tuple[PrintedFormula, ...] = (
 
 _PREFACE = """# Errata and conventions of the source texts
 
-L. Jing, O. Stephansson, *Fundamentals of Discrete Element Methods for Rock Engineering*, Elsevier
-2007, chapter 2, as read from an electronic text of the book. Symbols are ours: `omega` is the
-angular velocity, `domega` its rate in body axes, `a0` the acceleration of the body's origin `X0`,
-`r_c` the mass centre, `J` the inertia tensor about the origin, `ddX` a second derivative. *Holds*
-means that the derived form agrees identically, *convention* that it agrees when read as the remark
-says, *misprint* that it does not agree. Every verdict is computed by
-`tests/book_formulas/checks.py` or `tests/book_formulas/elastic.py`; this page is written from
+After this page you know which printed formulas of the sources are correct, and how to read them.
+
+The source is L. Jing, O. Stephansson, *Fundamentals of Discrete Element Methods for Rock
+Engineering*, Elsevier 2007, chapter 2, in an electronic text of the book. `omega` is the angular
+velocity, `domega` its rate in body axes, `a0` the acceleration of the body's origin `X0`, `r_c` the
+mass centre, `J` the inertia tensor about the origin, `ddX` a second derivative.
+
+*Holds* means that the derived form agrees identically, *convention* that it agrees with the reading
+in the remark, *misprint* that it does not agree. Every verdict is computed by
+`tests/book_formulas/checks.py` or `tests/book_formulas/elastic.py`. This page is written from
 `tests/book_formulas/formulas.py`, and the tests repeat the checks.
 
 """
