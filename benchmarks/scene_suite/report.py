@@ -16,22 +16,23 @@ def words(point: dict[str, Any]) -> str:
 _PAGE = """\
 # Benchmark: eight scenes against other programs
 
-Every method of mstmm over its tolerances or steps, on both engines (the fused one up to 20 speeds,
-its C compiled before), as `mstmm chart` tries them; beside them SciPy and SUNDIALS on mstmm's
-compiled equations with their exact Jacobian, and other programs where they have such a scene.
+Find the cheapest method for eight scenes and two errors, in mstmm and in other programs. The charts
+show every method of mstmm over its tolerances or steps, on both engines (the fused one up to 20
+speeds, compiled before), as made by `mstmm chart`. SciPy and SUNDIALS use the compiled equations of
+mstmm with their exact Jacobian; other programs are included where they can model the scene.
 Written by `python -m benchmarks.scene_suite`.
 
 ![CPU time over achieved error of eight scenes, mstmm and its peers]({picture})
 
 ## Recommended settings
 
-The cheapest setting of mstmm that errs by at most so much in the place of one end at the end, as
-all tighter ones of its method do, beside the cheapest of the best peer that does. CPU time of one
-whole warm call that gives the end of the motion (`simulate`, `solve_ivp`, a loop in C,
-`SolveDynamic`), everything set up before, the least of {rounds} rounds in which all take turns.
-A call of `simulate` looks at its arguments, makes a result and keeps what vouches for it; CasADi's
-C and Pinocchio run in a bare loop: where a motion takes no time, that is the difference.
-{processor}, {cores} cores, load {load:.1f}: what means something elsewhere is the ratio.
+The cheapest setting of mstmm whose error in the final position of one end, and that of all tighter
+settings of its method, is within the limit; next to it the cheapest of the best peer. CPU time of
+one whole warm call that gives the final state (`simulate`, `solve_ivp`, a loop in C,
+`SolveDynamic`), without preparation, minimum of {rounds} alternating rounds. A call of `simulate`
+checks its arguments, creates a result and keeps data for its certificate; the C of CasADi and
+Pinocchio runs in a bare loop. For short motions this is the difference.
+{processor}, {cores} cores, load {load:.1f}: only ratios carry over to other machines.
 
 {table}
 
@@ -58,7 +59,7 @@ def page(record: dict[str, Any], picture: str) -> str:
 def table(record: dict[str, Any]) -> str:
     """What to take for every scene and error."""
     lines = [
-        "| scene | error | mstmm | CPU ms | best peer | CPU ms | mstmm / it |", "|---" * 7 + "|",
+        "| scene | error | mstmm | CPU ms | best peer | CPU ms | mstmm / peer |", "|---" * 7 + "|",
     ]  # fmt: skip
     for result in record["results"]:
         lines += [row(result, asked) for asked in result["recommended"]]
