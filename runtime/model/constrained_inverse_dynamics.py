@@ -28,7 +28,7 @@ _MIN_SHARE = 1e-7
 def reduced_mass(model: CompiledScene, q: Array) -> Array:
     """Mass matrix N^T M N (n, n) of the independent speeds at q (nq,)."""
     assert model.freedom is not None
-    refuse_dense(len(model.freedom.places), "the mass matrix")
+    check_dense_size(len(model.freedom.places), "the mass matrix")
     motions = model.freedom.following(q, model.freedom.places)
     matrix = model.looped.required_by_inertia(q, motions.T) @ motions
     return np.asarray((matrix + matrix.T) / 2)

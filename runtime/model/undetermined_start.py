@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotionError
 
-from ..packing.records.trial_rotors import trial_rotors
-
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..engine.looped_engine import LoopedEngine

@@ -20,13 +20,7 @@ from mstmm.scene.validators.scalars_and_vectors import GROUND
 from ...chart.model_levels import with_tables
 from ...packing.flexible.rigid_substitution import substitute_rigid_bodies
 from ...packing.merging.referenced_parts import ReferencedParts, referenced_parts
-from ...packing.merging.weld_geometry import (
-    end_pose,
-    merged_body,
-    to_end,
-    to_orientation,
-    weld_pose,
-)
+from ...packing.merging.weld_geometry import end_at, end_of, orientation_of, together, weld_pose
 from ..body_model_levels import RIGID
 from ..measure_renaming import compose_names, rename_reference
 from .chain_expansion import ExpandedScene, expand_chains, expandable_chains
@@ -207,7 +201,9 @@ def _remove_weld(
     pose = weld_pose(weld, bodies.get(weld.inboard_body), bodies[weld.outboard_body])
     if removed != weld.outboard_body:
         pose = pose.inverse
-    places = {gone: pose} | {f"{gone}.{end}": pose.then(end_pose(part, end)) for end in part.ends}
+    poses = {removed: pose} | {
+        f"{removed}.{end}": pose.then(end_of(part, end)) for end in part.ends
+    }
     scene = with_tables(
         merged.scene, hinge=tuple(hinge for hinge in merged.scene.hinge if hinge.name != weld.name)
     )
@@ -222,14 +218,17 @@ def _merge_into_body(
 ) -> MergedScene:
     """Merge a body into another one; `poses` are those of its origin and ends in that body."""
     ends, names = dict(whole.ends), {}
-    for old, pose in places.items():
-        own = _free_name(ends, old.replace(".", "_"))
-        ends[own], names[old] = to_end(pose), f"{whole.name}.{own}"
-    body = merged_body(whole, part, places[part.name]).model_copy(update={"ends": ends})
-    made = with_names(scene, names)
-    others = tuple(one for one in scene.body if one.name != part.name)
-    made = with_tables(made, body=tuple(body if one.name == whole.name else one for one in others))
-    return _gone(found, made, part.name, whole.name, names)
+    for old, pose in poses.items():
+        end = _unused_name(ends, old.replace(".", "_"))
+        ends[end], names[old] = end_at(pose), f"{whole.name}.{end}"
+    body = together(whole, part, poses[part.name]).model_copy(update={"ends": ends})
+    renamed = with_references(scene, names)
+    bodies = tuple(
+        body if other.name == whole.name else other
+        for other in scene.body
+        if other.name != part.name
+    )
+    return _record_removal(merged, with_tables(renamed, body=bodies), part.name, whole.name, names)
 
 
 def _unused_name(ends: Collection[str], name: str) -> str:
@@ -302,8 +301,8 @@ def _attached_to_ground(element: Any, rotation: Matrix, poses: Mapping[str, Pose
     pose = poses[element.inboard]
     return element.model_copy(
         update={
-            "inboard": GROUND, "position": held.position,
-            "orientation": to_orientation(held.then(Pose(ZERO, rotation))),
+            "inboard": GROUND, "position": pose.position,
+            "orientation": orientation_of(pose.then(Pose(ZERO, rotation))),
         }
     )  # fmt: skip
 

@@ -27,7 +27,7 @@ from ...flexible.beam.beam_data import BeamData, beam_data
 from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_conditions
 from ...flexible.beam.dynamic_stiffness import BENDING, HarmonicBeam, harmonic_beam
 from ...flexible.kernel_inputs import transform_body
-from ...packing.scene_parameters import data_of, made_of
+from ...packing.scene_parameters import scene_data, scene_from_data
 from ..frozen_loads import standing
 from ..input_channels import GROUND, Channel, channel
 from ..mck_matrices import State

@@ -17,7 +17,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import MstmmError
 from mstmm.risk import Risk
 
-from ...packing.scene_parameters import data_of, made_of
+from ...packing.scene_parameters import scene_data, scene_from_data
 from ...result.flexible.unshaped_directions import unshaped_directions
 from ..input_channels import Channel
 
@@ -83,7 +83,7 @@ def _with_shapes(
 ) -> LinearEquations:
     """The linear model at the same state, its beams with shapes in these directions too."""
     model, state = linear.model, linear.state
-    data = data_of(model.scene)
+    data = scene_data(model.scene)
     for beam in data["beam"]:
         if beam["name"] in lacking:
             body = model.flexible[beam["name"]]
@@ -92,7 +92,7 @@ def _with_shapes(
             counts = Counter(mode.rstrip("0123456789") for mode in body.modes)
             beam["modes"] = {**counts, **dict.fromkeys(lacking[beam["name"]], _SHAPES)}
             beam["frame"] = body.frame
-    made = type(model)(made_of(data, model.scene), model.known)
+    made = type(model)(scene_from_data(data, model.scene), model.known)
     assert isinstance(made, Linearisable)
     amplitudes = None if linear.dry is None else linear.dry.amplitudes
     return made.linearize(

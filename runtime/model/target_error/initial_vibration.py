@@ -123,7 +123,7 @@ def initial_vibration(
     y, memory = np.concatenate([q, u]), engine.start_memory()
     if len(y) > _MAX_COORDINATES:
         return Vibration(fastest_at_start(engine, t, q, u), span, empty, empty, empty, empty)
-    refuse_steps(engine.packed)
+    reject_qr_steps(engine.packed)
     try:
         roots, vectors = eigenvalues(engine, t, y, memory)
         rate = float(np.abs(roots).max(initial=0.0))

@@ -14,7 +14,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from ...flexible.beam.static_shapes import stiffness_of
+from ...flexible.beam.static_shapes import direction_stiffness
 from ...flexible.modal_body import ModalBody
 
 #: Deformations that are too small to matter: rad, of axial a strain.
@@ -77,7 +77,7 @@ def unshaped_directions(body: ModalBody) -> list[str]:
     return [
         direction
         for direction in _NEGLIGIBLE
-        if direction not in shaped and stiffness_of(body.shapes.data, direction).min() > 0
+        if direction not in shaped and direction_stiffness(body.shapes.data, direction).min() > 0
     ]
 
 
