@@ -73,7 +73,7 @@ def load_method(name: str) -> None:
     if name in classical_run.METHODS:
         return
     if name in sundials.METHODS:
-        sundials.refuse_without(name)
+        sundials.require_package(name)
     elif not name.startswith(EXTERNAL_PREFIXES):
         from mstmm.runtime.integrate.steppers import AUTO, AUTO_EXPLICIT, get
 

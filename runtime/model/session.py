@@ -23,13 +23,13 @@ from ..integrate.settings import Settings
 from ..integrate.steppers import AUTO
 from ..result.factory import result_of
 from ..run import classical_run, external_integrators
-from ..run.engine_choice import for_many
-from ..run.integration_run import SLICE, make_run, project_samples, settles, split
-from ..run.measured_quantities import MeasuredOutputs, refuse_one_way
-from ..run.run_notes import unseen
+from ..run.engine_choice import code_for_any_length
+from ..run.integration_run import SLICE, make_run, needs_projection, project_samples, split
+from ..run.measured_quantities import MeasuredOutputs, reject_one_way
+from ..run.run_notes import missed_switch_note
 from ..run.scene_system import SceneSystem
 from ..run.step_stability import check_step
-from ..run.stop_messages import message_of
+from ..run.stop_messages import stop_message
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
@@ -66,11 +66,11 @@ class Session:
         risks: tuple[Risk, ...] = (),
     ) -> None:
         check_method(settings)
-        refuse_one_way(model.packed, "a session")
+        reject_one_way(model.packed, "a session")
         self.model, self.settings, self._risks = model, settings, risks
         self._names = settable_inputs(model)
         self._packed = with_held_inputs(model.packed, self._names, settings.t_start)
-        self._code = for_many(model, settings)
+        self._code = code_for_any_length(model, settings)
         self._outputs: MeasuredOutputs | None = MeasuredOutputs(LoopedEngine(self._packed))
         self._start_run(q, u, -math.inf if self._packed.goes_by_time else math.inf)
 
@@ -79,7 +79,7 @@ class Session:
         engine = LoopedEngine(self._packed)
         system = self._system = SceneSystem(engine, self._code)
         self._run: Integrator = make_run(system, self.settings, q, u, _SAMPLE_ROWS)
-        self._needs_projection = settles(engine)
+        self._needs_projection = needs_projection(engine)
         ffi, n = engine.ffi, len(self._names)
         self._indices = {name: k for k, name in enumerate(self._names)}
         self._new_inputs = ffi.new("double[]", list(self._input_values()) or [0.0])
@@ -154,7 +154,7 @@ class Session:
         """Message of a failure, with the current inputs."""
         system = shallow(self._system)
         system.engine = self._current_model().looped
-        return message_of(system, self._run)
+        return stop_message(system, self._run)
 
     def _update_time_map(self, dt: float) -> None:
         """Compute breaks and short signals beyond the end of this tick."""
@@ -207,7 +207,7 @@ class Session:
         return (
             self._risks
             if unseen_condition is None
-            else (*self._risks, unseen(self._system, *unseen_condition))
+            else (*self._risks, missed_switch_note(self._system, *unseen_condition))
         )
 
     @property
@@ -223,7 +223,7 @@ class Session:
     @property
     def stopped(self) -> str:
         """Reason why an event ended the session; "" while it runs."""
-        return message_of(self._system, self._run) if self._run.status is Status.STOPPED else ""
+        return stop_message(self._system, self._run) if self._run.status is Status.STOPPED else ""
 
     def outputs(self) -> dict[str, Any]:
         """Outputs of the scene at the current state by name: numbers, or arrays for vectors."""
@@ -244,7 +244,7 @@ class Session:
         samples = Samples(np.array([run.t]), run.y[None], memory, np.zeros(1, dtype=np.int64))
         settings = replace(self.settings, t_end=run.t, output_times=None)
         trajectory = split(
-            self._system, samples, settings, Status.FINISHED, message_of(self._system, run),
+            self._system, samples, settings, Status.FINISHED, stop_message(self._system, run),
             run.statistics, (run.t, run.y),
         )  # fmt: skip
         return result_of(model, trajectory)

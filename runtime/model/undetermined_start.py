@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError, UndeterminedMotionError
 
+from ..packing.records.trial_rotors import trial_rotors
+
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..engine.looped_engine import LoopedEngine
@@ -49,7 +51,7 @@ def _undetermined_hinges(
 ) -> list[int]:
     """Tree indices of all hinges with an undetermined motion, that of the error first."""
     places = [error.place]
-    with rotors(engine.packed.written) as add_rotor:
+    with trial_rotors(engine.packed.written) as add_rotor:
         while len(places) < _MAX_HINGES and not engine.is_flexible(places[-1]):
             add_rotor(places[-1])
             try:

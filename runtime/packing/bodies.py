@@ -128,16 +128,18 @@ class Bodies:
             return None, None  # the massless node of the section at the inboard hinge
         modal = None
         if name in self.expanded.bodies:
-            turned = transform_body(body, np.array(place.rotation), np.array(place.origin))
-            modal = _modal(turned, self.layout.modal[name])
+            body = transform_body(body, np.array(placement.rotation), np.array(placement.origin))
+            modal = _modal_numbers(body, self.layout.modal[name])
         if passage is None:
             return modal, None
         port = passage.port
         frame = self.scene.bodies.find(passage.body)
         assert frame is not None
         if not passage.inward:
-            own = self.placement(frame)
-            port = transform_section(port, np.array(own.rotation), np.array(own.origin))
+            floating_frame = self.placement(frame)
+            port = transform_section(
+                port, np.array(floating_frame.rotation), np.array(floating_frame.origin)
+            )
         return modal, SectionNumbers(
             self.topology.place_of_body(frame), passage.inward, Arrays(section_inputs(port)),
             tuple(port.rotation.ravel().tolist()),

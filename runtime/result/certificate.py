@@ -10,7 +10,7 @@ from mstmm.notebook_html import NotebookDisplay, table
 from mstmm.risk import Risk, order_risks, sentences
 
 from ..integrate.achieved_error import AchievedError
-from ..run.error_estimate import ANGLE, PART, ErrorEstimate, limit
+from ..run.error_estimate import ANGLE, PART, ErrorEstimate, error_limit
 from ..run.step_stability import StepCheck
 from .certificate_data import Drift, SpringDeflection
 from .conditioning import MAX_CHECKED_BODIES, PivotLoss, SingularDistance
@@ -219,7 +219,7 @@ def _accuracy_objections(c: Certificate, accuracy: float) -> list[str]:
     objections = []
     for unit, values in c.error.q.items():
         worst = float(values.max(initial=0.0))
-        if worst > limit(c.error.moved, unit, accuracy, accuracy):
+        if worst > error_limit(c.error.moved, unit, accuracy, accuracy):
             motion = (
                 "" if unit == "rad" else f" of {c.error.moved.get(unit, 0.0):.2g} {unit} of motion"
             )

@@ -13,7 +13,7 @@ from mstmm.errors import NumericalFailure
 from ..engine.loops.loop_analysis import NEGLIGIBLE_MISFIT
 from ..engine.loops.loop_calls import LoopCalls
 from ..integrate.steppers import INDEX3_SUFFIX
-from ..packing.loops.system_variants import LOCKED, length_of
+from ..packing.loops.system_variants import LOCKED, characteristic_length
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
@@ -60,7 +60,10 @@ def loop_closure(model: CompiledScene, run: Trajectory) -> Closure | None:
     if model.closed is None or not len(run.t):
         return None
     calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
-    misfit, misfit_loop = NEGLIGIBLE_MISFIT * LOCKED * length_of(model.packed.system), ""
+    misfit, misfit_loop = (
+        NEGLIGIBLE_MISFIT * LOCKED * characteristic_length(model.packed.system),
+        "",
+    )
     for k in np.unique(np.linspace(0, len(run.t) - 1, _MAX_SAMPLES).astype(int)):
         q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
         if model.packed.releases:

@@ -44,11 +44,13 @@ def _compute_limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
         limit = body.resolved
         if body.shapes is not None and name in beams and environment is not None:
             beam, data = beams[name], body.shapes.data
-            held = boundary_conditions(around, beam, beam_data(beam))
-            key = repr((beam.model_copy(update={"name": ""}), held, body.modes))
-            if key not in alike:
-                alike[key] = beam_resolution(body.shapes, held) if data.mass else np.inf
-            limit = alike[key]
+            boundary = boundary_conditions(environment, beam, beam_data(beam))
+            key = repr((beam.model_copy(update={"name": ""}), boundary, body.modes))
+            if key not in limits_by_beam:
+                limits_by_beam[key] = (
+                    beam_resolution(body.shapes, boundary) if data.mass else np.inf
+                )
+            limit = limits_by_beam[key]
         if limit is not None and np.isfinite(limit):
             yield name, limit
 

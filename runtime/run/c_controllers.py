@@ -1,4 +1,4 @@
-"""Controllers of a scene in C: matrices, what they measure, and where their state is kept."""
+"""C records of a scene's controllers: matrices, measured quantities, memory offset."""
 
 from __future__ import annotations
 
@@ -11,45 +11,45 @@ from mstmm.expression.expression import Expression, parse
 from mstmm.scene.tables.scene_tables import SceneTables
 
 from ..engine.looped_engine import LoopedEngine
-from .measured_quantities import MeasuredQuantities, refuse_one_way
+from .measured_quantities import MeasuredQuantities, reject_one_way
 
 
 class Controllers:
-    """`records` is `mstmm_controller[]` of a scene, `count` of them; it keeps all they point to.
+    """`records`: `mstmm_controller[]` of a scene with `count` entries.
 
-    Raises SceneError, with the controller's name, for what a run cannot measure.
+    The object owns all memory that the records point to.  Raises SceneError with the name of the
+    controller for an input that a run cannot measure.
     """
 
     def __init__(self, engine: LoopedEngine) -> None:
         scene, ffi = engine.packed.described, engine.ffi
         self.count = len(scene.controller)
-        refuse_one_way(engine.packed, f'controller "{scene.controller[0].name}"')
+        reject_one_way(engine.packed, f'controller "{scene.controller[0].name}"')
         self.records = ffi.new("mstmm_controller[]", self.count)
-        self._kept: list[Any] = []
-        place = engine.packed.system.held.first
-        for record, one in zip(self.records, scene.controller, strict=True):
+        self._keep_alive: list[Any] = []
+        memory_offset = engine.packed.system.held.first
+        output_names = [output.name for output in scene.output]
+        for record, controller in zip(self.records, scene.controller, strict=True):
             try:
-                shown = [expression_of(scene, name) for name in one.inputs]
-                measured = MeasuredQuantities(
-                    engine, shown, [output.name for output in scene.output]
-                )
+                expressions = [measured_expression(scene, name) for name in controller.inputs]
+                measured = MeasuredQuantities(engine, expressions, output_names)
             except SceneError as error:
-                raise SceneError(f'controller "{one.name}": inputs: {error}') from None
-            record.sample_time, record.memory, record.measure = (
-                one.sample_time, place, measured.record,
-            )  # fmt: skip
-            record.n_x, record.n_y, record.n_u = len(one.A), len(one.inputs), len(one.outputs)
-            arrays = {key: np.array([*row, 0.0]) for key, row in one.filled.items()}
+                raise SceneError(f'controller "{controller.name}": inputs: {error}') from None
+            record.sample_time, record.memory = controller.sample_time, memory_offset
+            record.measure = measured.record
+            record.n_x, record.n_y = len(controller.A), len(controller.inputs)
+            record.n_u = len(controller.outputs)
+            arrays = {key: np.array([*row, 0.0]) for key, row in controller.filled.items()}
             for key in ("A", "B", "C", "D", "reference", "offset"):
                 setattr(record, key, engine.pointer(arrays[key]))
             scratch = np.zeros(record.n_y + 1), np.zeros(record.n_x + 1)
             record.y, record.next = map(engine.pointer, scratch)
-            self._kept += [measured, *arrays.values(), *scratch]
-            place += 1 + record.n_x + record.n_u
+            self._keep_alive += [measured, *arrays.values(), *scratch]
+            memory_offset += 1 + record.n_x + record.n_u
 
 
-def expression_of(scene: SceneTables, name: str) -> Expression:
-    """What a name stands for: an output of the scene or a component of one, else a quantity."""
+def measured_expression(scene: SceneTables, name: str) -> Expression:
+    """Expression of an output of the scene, of a component of an output, or of a quantity."""
     for output in scene.output:
         if name == output.name:
             return output.of

@@ -1,4 +1,4 @@
-"""A run kept in a file, so that another process can continue it bit for bit."""
+"""Checkpoint files, from which another process continues a run bit for bit."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ State = Mapping[str, Any]
 _FORMAT = "mstmm checkpoint 5"
 _ROWS = ("t", "y", "memory", "event")
 
-#: Name, kind of numbers and axes of what a file holds.
+#: Name, NumPy dtype kind and number of axes of each array in a file.
 _STATE = (
     ("real", "f", 1), ("integer", "i", 1), ("engine", "U", 0), ("message", "U", 0),
     ("methods", "U", 0), ("seconds", "f", 0),
@@ -38,9 +38,9 @@ _SAMPLES = (("t", "f", 1), ("y", "f", 2), ("memory", "f", 2), ("event", "i", 1))
 
 
 class Checkpoint:
-    """One file: what was asked for (as hashes), where the run stands, every sample so far.
+    """Checkpoint file: hashes of the request, integrator state, all samples so far.
 
-    Raises EnvironmentFailure at once if its folder cannot be written.
+    Raises EnvironmentFailure at construction if the folder is not writable.
     """
 
     def __init__(
@@ -49,7 +49,9 @@ class Checkpoint:
         self.path = path
         folder = path.absolute().parent
         if not folder.is_dir() or not os.access(folder, os.W_OK):
-            raise EnvironmentFailure(f'checkpoint "{path}": its folder cannot be written to')
+            raise EnvironmentFailure(
+                f'checkpoint "{path}": its folder does not exist or is not writable'
+            )
         self.asked = {
             "scene": _hash(model.scene.to_toml()),
             "settings": _hash(json.dumps(asdict(settings)) + q.tobytes().hex() + u.tobytes().hex()),
@@ -57,21 +59,21 @@ class Checkpoint:
         }
 
     def exists(self) -> bool:
-        """True if there is something to continue."""
+        """True if the checkpoint file exists."""
         return self.path.exists()
 
     def save(self, state: State, samples: Samples) -> None:
-        """Write everything; the old file stays until the new one is whole."""
+        """Write state and samples; the old file is replaced only once the new one is complete."""
         rows = {name: getattr(samples, name) for name in _ROWS}
         with replace_atomically(self.path) as temporary, temporary.open("wb") as file:
-            words = {key: np.array(text) for key, text in self.asked.items()}
-            arrays: dict[str, Any] = {"format": np.array(_FORMAT), **state, **rows, **words}
+            hashes = {key: np.array(text) for key, text in self.asked.items()}
+            arrays: dict[str, Any] = {"format": np.array(_FORMAT), **state, **rows, **hashes}
             np.savez(file, **arrays)
 
     def load(self) -> tuple[State, Samples]:
-        """State and samples.
+        """Read state and samples.
 
-        SceneError if the file is no checkpoint, is damaged, or belongs to another run.
+        Raises SceneError if the file is no checkpoint, is damaged, or belongs to another run.
         """
         require_regular_file(self.path, "checkpoint")
         try:
@@ -79,44 +81,48 @@ class Checkpoint:
         except (FileNotFoundError, ValueError) as error:
             raise SceneError(f'checkpoint "{self.path}" cannot be read: {error}') from None
         if str(data.get("format")) != _FORMAT:
-            raise SceneError(f'checkpoint "{self.path}" is not one of this version of mstmm')
-        for key, word in (
+            raise SceneError(
+                f'checkpoint "{self.path}" was not written by this version of mstmm; '
+                "run without resume to start again"
+            )
+        for key, changed in (
             ("scene", "the scene has"),
-            ("settings", "the settings or the start have"),
+            ("settings", "the settings or the initial state have"),
             ("kernels", "the compiled kernels have"),
         ):
             if str(data.get(key)) != self.asked[key]:
                 raise SceneError(
-                    f'checkpoint "{self.path}" belongs to another run: {word} changed since; '
+                    f'checkpoint "{self.path}" belongs to another run: {changed} changed since; '
                     "run without resume to start again"
                 )
-        state = {name: self._taken(data, name, kind, ndim) for name, kind, ndim in _STATE}
+        state = {name: self._checked_array(data, name, kind, ndim) for name, kind, ndim in _STATE}
         if not 0.0 <= state["seconds"] < np.inf:
-            raise self.damaged("a time that no run can have taken")
-        rows = [self._taken(data, name, kind, ndim) for name, kind, ndim in _SAMPLES]
+            raise self.damaged("an impossible elapsed time")
+        rows = [self._checked_array(data, name, kind, ndim) for name, kind, ndim in _SAMPLES]
         times = rows[0]
         if len({len(row) for row in rows}) > 1 or not np.all(times[1:] >= times[:-1]):
-            raise self.damaged("samples that do not belong together")
+            raise self.damaged("inconsistent samples")
         return state, Samples(*rows)
 
-    def _taken(self, data: State, name: str, kind: str, ndim: int) -> Any:
-        """One array as it was written; SceneError if it is missing or of another kind."""
-        found = data.get(name)
-        if found is None or found.dtype.kind != kind or found.ndim != ndim:
-            what = "nothing" if found is None else f"{found.dtype} of shape {found.shape}"
-            raise self.damaged(f"{what} as {name}")
-        return found
+    def _checked_array(self, data: State, name: str, kind: str, ndim: int) -> Any:
+        """Array `name` of the file; SceneError if it is missing or of another kind or rank."""
+        array = data.get(name)
+        if array is None or array.dtype.kind != kind or array.ndim != ndim:
+            found = "nothing" if array is None else f"{array.dtype} of shape {array.shape}"
+            raise self.damaged(f"{found} as {name}")
+        return array
 
     def damaged(self, found: str) -> SceneError:
-        """The error for a file whose numbers nobody wrote this way."""
+        """Error for a file whose content no run can have written."""
         return SceneError(
             f'checkpoint "{self.path}" is damaged: it holds {found}; '
             "run without resume to start again"
         )
 
     def remove(self) -> None:
-        """The result is where it belongs: nothing to continue."""
-        with suppress(OSError):  # a file that stays is refused or continued, never wrong
+        """Delete the file once the result is complete."""
+        # A file that cannot be deleted does no harm: a later run rejects or continues it.
+        with suppress(OSError):
             self.path.unlink(missing_ok=True)
 
 

@@ -1,7 +1,7 @@
-"""Starts on or behind what throws back: refused where nothing would throw the motion back.
+"""Reject starts on or past a contact: a bounce event or a hard stop.
 
-An event whose condition holds at the start happens there: what moves against it is thrown back.
-What rests on it is not, and would fall through it.
+An event whose condition holds at the start fires there, so that a motion into the contact bounces.
+A motion at rest on the contact does not bounce and would pass through it.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from mstmm.errors import NumericalFailure, SceneError
 from ..engine.looped_engine import LoopedEngine
 from ..packing.records.bounce_records import Bounce
 
-#: Within this part of the places and speeds that it reads, or of 1 rad or m and a second, a state
-#: is on what throws back, and does not move against it.
-_CLOSE = 1e-9
-#: Times, s, after one of which what rests there shows whether its acceleration takes it away:
-#: gently, or while it turns fast.
-_SOON = 1e-3, 1e-6
+#: Relative tolerance within which a state counts as on the contact and as at rest there: of the
+#: positions and speeds that the condition reads, at least of 1 rad or m and of 1 rad/s or m/s.
+_TOLERANCE = 1e-9
+#: Times in s over which the acceleration may release a resting contact: the longer one for slow
+#: releases, the shorter one for fast rotations.
+_RELEASE_TIMES = 1e-3, 1e-6
 
 
 class ContactSystem(Protocol):
-    """What is asked of a `SceneSystem`."""
+    """Part of `SceneSystem` that this check needs."""
 
     engine: LoopedEngine
     memory: Array
@@ -35,30 +35,33 @@ class ContactSystem(Protocol):
 
 
 def check_contact_start(system: ContactSystem, t: float, y: Array) -> None:
-    """SceneError for a run that begins at rest on an event that bounces, or on a hard stop; or
-    behind one without leaving it, behind a hard stop in any case."""
+    """Reject a start on or past a contact.
+
+    Raises SceneError where the state rests on a bounce event or a hard stop, is past a bounce event
+    without leaving it, or is past a hard stop.
+    """
     bounces = system.engine.packed.watched.bounces
     values = system.watched(t, y) if bounces else None
     if values is None:
         return
     for bounce in bounces:
         try:
-            _refuse(system, bounce, float(values[bounce.event]), t, y)
-        except NumericalFailure:  # which the run meets, and tells
+            _check_bounce(system, bounce, float(values[bounce.event]), t, y)
+        except NumericalFailure:  # the run meets the same failure and reports it
             continue
 
 
-def _refuse(system: ContactSystem, bounce: Bounce, value: float, t: float, y: Array) -> None:
-    met = system.meeting(bounce.event, t, y, _speeds(system, y))
-    close = _CLOSE * met.reach
-    if not value >= -close:
+def _check_bounce(system: ContactSystem, bounce: Bounce, value: float, t: float, y: Array) -> None:
+    contact = system.meeting(bounce.event, t, y, _speeds(system, y))
+    tolerance = _TOLERANCE * contact.reach
+    if not value >= -tolerance:
         return
-    rate, beyond = _rate(system, bounce, t, y), value > close
-    if rate == 0 or (beyond and (rate > 0 or _is_stop(system, bounce))):
-        raise SceneError(_said(system, bounce, y, value, beyond))
+    rate, is_past = _approach_rate(system, bounce, t, y), value > tolerance
+    if rate == 0 or (is_past and (rate > 0 or _is_hard_stop(system, bounce))):
+        raise SceneError(_message(system, bounce, y, value, is_past))
 
 
-def _is_stop(system: ContactSystem, bounce: Bounce) -> bool:
+def _is_hard_stop(system: ContactSystem, bounce: Bounce) -> bool:
     return bounce.event >= len(system.engine.packed.scene.event)
 
 
@@ -67,44 +70,49 @@ def _speeds(system: ContactSystem, y: Array) -> Array:
     return y[engine.nq : engine.nq + engine.nu]
 
 
-def _rate(system: ContactSystem, bounce: Bounce, t: float, y: Array) -> float:
-    """That with which a state moves on into it, 1/s: below 0 where it leaves, or stands and is
-    taken away by its acceleration; 0 where it rests there."""
-    met = system.meeting(bounce.event, t, y, _speeds(system, y))
-    still = _CLOSE * (met.size + met.steepness)
-    if abs(met.rate) > still:
-        return float(met.rate)
+def _approach_rate(system: ContactSystem, bounce: Bounce, t: float, y: Array) -> float:
+    """Rate in 1/s at which a state moves into the contact.
+
+    Negative where the state leaves the contact or its acceleration releases it, 0 where it rests.
+    """
+    contact = system.meeting(bounce.event, t, y, _speeds(system, y))
+    tolerance = _TOLERANCE * (contact.size + contact.steepness)
+    if abs(contact.rate) > tolerance:
+        return float(contact.rate)
     rates = []
-    for wait in _SOON:
-        soon = _state_soon(system, t, y, wait)
-        met = system.meeting(bounce.event, t + wait, soon, _speeds(system, soon))
-        rates.append(float(met.rate))
-    return min(rates) if min(rates) < -still else 0.0
+    for dt in _RELEASE_TIMES:
+        later = _extrapolate(system, t, y, dt)
+        contact = system.meeting(bounce.event, t + dt, later, _speeds(system, later))
+        rates.append(float(contact.rate))
+    return min(rates) if min(rates) < -tolerance else 0.0
 
 
-def _state_soon(system: ContactSystem, t: float, y: Array, wait: float) -> Array:
-    """The state that its acceleration leads to."""
+def _extrapolate(system: ContactSystem, t: float, y: Array, dt: float) -> Array:
+    """State after dt (s) with the accelerations at t."""
     engine = system.engine
     q, u, memory = (np.array(x)[None] for x in (y[: engine.nq], _speeds(system, y), system.memory))
-    gained = wait * engine.accelerations(t, q, u, memory)[1]
-    moved = wait * engine.accelerations(t, q, u + gained / 2, memory)[0]
-    return np.concatenate([(q + moved)[0], (u + gained)[0]])
+    delta_u = dt * engine.accelerations(t, q, u, memory)[1]
+    delta_q = dt * engine.accelerations(t, q, u + delta_u / 2, memory)[0]
+    return np.concatenate([(q + delta_q)[0], (u + delta_u)[0]])
 
 
-def _said(system: ContactSystem, bounce: Bounce, y: Array, value: float, beyond: bool) -> str:
+def _message(system: ContactSystem, bounce: Bounce, y: Array, value: float, is_past: bool) -> str:
     packed = system.engine.packed
-    what, when = packed.scene.happening(bounce.event), packed.scene.events[bounce.event].when
-    where = "beyond" if beyond else "on"
-    if not _is_stop(system, bounce):
-        found = f"by {value:.6g}, without leaving it" if beyond else "and rests there"
+    where, when = packed.scene.happening(bounce.event), packed.scene.events[bounce.event].when
+    if not _is_hard_stop(system, bounce):
+        found = (
+            f"past the contact by {value:.6g} and does not leave it"
+            if is_past
+            else "at rest on the contact"
+        )
         return (
-            f"{what}: the run begins {where} it, {when.text!r}, {found}: nothing throws back what "
-            "does not come to it; begin where that does not hold yet, or let it leave at the start"
+            f"{where}: the run starts {found} ({when.text!r} holds), so that it cannot bounce; "
+            "start where the condition does not hold, or with a speed away from the contact"
         )
     assert when.comparison is not None
-    place, limit = bounce.places[0][0], when.comparison[2].constant or 0.0
+    coordinate, limit = bounce.places[0][0], when.comparison[2].constant or 0.0
     return (
-        f"{what}: {packed.layout.q_names[place]} = {y[place]:.9g} begins {where} it, "
-        f"at {limit:.9g}, where nothing throws it back; begin between the stops, or let it leave "
-        "at the start"
+        f"{where}: the run starts with {packed.layout.q_names[coordinate]} = "
+        f"{y[coordinate]:.9g}, {'past' if is_past else 'at rest on'} the stop at {limit:.9g}, so "
+        "that it cannot bounce; start between the stops, or with a speed away from the stop"
     )

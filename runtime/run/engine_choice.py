@@ -1,8 +1,8 @@
-"""Which engine a run takes: code compiled for the scene where it is there or pays, else the loop.
+"""Choice of the engine of a run: fused code where it exists or pays, else the looped engine.
 
-The choice never looks at a clock.  A scene whose code is not there yet starts on the looped engine;
-after so many steps the evaluations of the whole run are known well enough, and if compiling pays
-the run starts again on compiled code, so that its numbers do not depend on when that was decided.
+The choice never depends on a clock.  A scene without fused code starts on the looped engine.  After
+a given number of steps the evaluations of the whole run are extrapolated; if compilation pays, the
+run restarts on fused code, so that its results do not depend on when this was decided.
 """
 
 from __future__ import annotations
@@ -22,21 +22,23 @@ if TYPE_CHECKING:
     from ..integrate.settings import Settings
     from ..kernels.fused_library import FusedLibrary
 
-#: Evaluations after which the length of a run is foretold.
-_LOOK_AFTER = 2000
+#: Evaluations after which the evaluations of the whole run are extrapolated.
+_EXTRAPOLATE_AFTER = 2000
 
 LOOPED, FUSED = "looped", "fused"
 
 
-def at_once(model: CompiledScene, settings: Settings, recorded: str | None) -> SceneCode | None:
-    """SceneCode code for a run that starts now; None for the looped engine.
+def code_at_start(
+    model: CompiledScene, settings: Settings, recorded: str | None
+) -> SceneCode | None:
+    """Fused code for a run that starts now; None for the looped engine.
 
     Args:
         model: the model.
         settings: of the run.
-        recorded: the engine of the run that is continued; None for a new one.
+        recorded: engine of the run that is restarted from a checkpoint; None for a new run.
 
-    Raises EnvironmentFailure if a run on compiled code is to be continued where there is none.
+    Raises EnvironmentFailure if a run on fused code is to be restarted where no code can be built.
     """
     if recorded == LOOPED:
         return None
@@ -46,39 +48,39 @@ def at_once(model: CompiledScene, settings: Settings, recorded: str | None) -> S
             library = model.fusion.build()
         except (EnvironmentFailure, SceneError) as error:
             raise EnvironmentFailure(
-                f"the run began on compiled code, which cannot be had now ({error}); "
+                f"checkpoint: the run began on fused code, which cannot be compiled now ({error}); "
                 "run without resume to start again"
             ) from None
-    return None if library is None else _compiled(model, settings, library, math.inf)
+    return None if library is None else _scene_code(model, settings, library, math.inf)
 
 
-def for_many(model: CompiledScene, settings: Settings) -> SceneCode | None:
-    """Code for steps without a known end, compiled where it is worth it for any number of them."""
+def code_for_any_length(model: CompiledScene, settings: Settings) -> SceneCode | None:
+    """Fused code for a run of unknown length, compiled if that can pay at all; else None."""
     library = model.fusion.ready(math.inf)
-    return None if library is None else _compiled(model, settings, library, math.inf)
+    return None if library is None else _scene_code(model, settings, library, math.inf)
 
 
-def look_after(model: CompiledScene, settings: Settings) -> int:
-    """Steps of a looped run after which `worth_compiling` is to be asked; 0 for never."""
+def steps_until_decision(model: CompiledScene, settings: Settings) -> int:
+    """Steps of a looped run after which `code_if_it_pays` is to be called; 0 for never."""
     if model.fusion.obstacle:
         return 0
-    return math.ceil(_LOOK_AFTER / get(settings.first_method).n_stages)
+    return math.ceil(_EXTRAPOLATE_AFTER / get(settings.first_method).n_stages)
 
 
-def worth_compiling(model: CompiledScene, settings: Settings, run: Integrator) -> SceneCode | None:
-    """SceneCode code if a looped run that has come so far is worth it."""
-    gone = run.t - settings.t_start
-    if not gone > 0.0:
+def code_if_it_pays(model: CompiledScene, settings: Settings, run: Integrator) -> SceneCode | None:
+    """Fused code if compilation pays for a looped run, extrapolated from its time so far."""
+    elapsed = run.t - settings.t_start
+    if not elapsed > 0.0:
         return None
-    evaluations = run.statistics.evaluations * (settings.t_end - settings.t_start) / gone
+    evaluations = run.statistics.evaluations * (settings.t_end - settings.t_start) / elapsed
     library = model.fusion.ready(evaluations)
-    return None if library is None else _compiled(model, settings, library, evaluations)
+    return None if library is None else _scene_code(model, settings, library, evaluations)
 
 
-def _compiled(
+def _scene_code(
     model: CompiledScene, settings: Settings, library: FusedLibrary, evaluations: float
 ) -> SceneCode:
-    """Lanes only for methods that have use for them; what implicit methods ask once one does."""
+    """Code with SIMD lanes only for iterated methods; implicit code is compiled on first use."""
     fusion, iterated = model.fusion, get(settings.first_method).iterated is not None
     lanes = fusion.ready_lanes(evaluations) if iterated else None
     implicit = partial(fusion.ready_implicit, evaluations)

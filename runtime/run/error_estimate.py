@@ -1,14 +1,14 @@
-"""Error of a run from a second, more accurate one.
+"""Error estimate of a run from a second, more accurate run.
 
 The second run has a hundredth of the tolerance (or half the fixed step).  The difference of the
-two is the error of the first up to the much smaller one of the second.  What is reported is SAFETY
-times the largest difference so far, so that a moment at which the two happen to cross does not pass
-for accuracy.  It holds until the two runs part for good: past that time (the predictability
-horizon) errors have no meaning, because neither run knows where the system is.
+two runs is the error of the first, up to the much smaller error of the second.  The estimate is
+SAFETY times the largest difference so far, because the difference alone vanishes where the runs
+happen to cross.  It is valid up to the predictability horizon: past that time the runs have
+diverged, and neither of them predicts the motion.
 
-The second run must differ in its steps, or it repeats the error of the first: where breaks and the
-end cut the steps of the first run, those of the second are shorter than the pieces; and a tolerance
-so loose that it bounds nothing is no measure of the second one.
+The second run must take other steps, or it repeats the error of the first: where breaks and the end
+cut the steps of the first run, those of the second are shorter than the pieces.  Where the
+tolerance of the first run is too loose to bound anything, that of the second does not follow it.
 """
 
 from __future__ import annotations
@@ -27,41 +27,42 @@ from .trajectory import Trajectory
 #: The estimate is this many times the difference of the two runs.
 SAFETY = 2.0
 
-#: A sample's estimate also covers this many samples after it: the two runs may cross at one.
+#: The estimate at a sample includes this many later samples, because the runs may cross at one.
 AHEAD = 3
 
-#: Tolerance of the second run in that of the first.  With a tenth its error is not always the
-#: smaller one: over 800 estimates of random scenes the ratio to the true error was 0.5 to 38 with a
-#: tenth, 1.2 to 5.2 with a hundredth.
+#: Tolerance of the second run relative to the first.  With a tenth its error is not always smaller:
+#: over 800 estimates of random scenes the ratio to the true error was 0.5 to 38 with a tenth, 1.2
+#: to 5.2 with a hundredth.
 TIGHTER = 0.01
 
-#: Angles (rad): two runs that differ by more no longer predict the same motion.
+#: Difference of angles (rad) from which two runs no longer predict the same motion.
 ANGLE = 0.01
 
-#: The same for other coordinates, as part of their largest excursion.
+#: The same for other coordinates, relative to their largest excursion.
 PART = 0.01
 
-#: Longest step of the second run in the longest one of the first: where both took long steps, the
-#: second one looks at other states and times.
-_ELSEWHERE = 0.37
+#: Longest step of the second run relative to the first: an incommensurate ratio, so that long steps
+#: of the two runs sample different states and times.
+_MAX_STEP_RATIO = 0.37
 
-#: No tolerance is tightened below this.
-_TIGHTEST = 1e-14
+#: Smallest tolerance of a second run.
+_MIN_TOLERANCE = 1e-14
 
-#: The second run's tolerance is at most this, its absolute one this part of the motion's size.
-_LOOSEST = 1e-4
+#: Largest rtol of the second run; also its largest atol relative to the size of the motion.
+_MAX_TOLERANCE = 1e-4
 
-#: Motions and errors below this are rounding: no tolerance follows them.
-_DUST = 1e-12
+#: Motions and errors below this are rounding.
+_ROUNDING = 1e-12
 
-#: Steps of the second run, at least, where the step is fixed.
-_FEWEST = 64
+#: Minimum number of steps of the second run with a fixed step.
+_MIN_FIXED_STEPS = 64
 
-#: Pieces between breaks that make up less than this part of the run are not halved.
-_MINOR = 0.01
+#: The shortest pieces between breaks that together cover less than this part of the run are not
+#: halved.
+_NEGLIGIBLE_SHARE = 0.01
 
-#: Growth of the error that counts as exponential, and as noise of rounding at its start.
-_GROWTH, _SMALLEST = 1e3, 1e-15
+#: Growth of the error that counts as exponential, and the smallest error above rounding.
+_EXPONENTIAL_GROWTH, _MIN_ERROR = 1e3, 1e-15
 
 
 @dataclass(frozen=True)
@@ -69,16 +70,16 @@ class ErrorEstimate:
     """Estimated error of a run: largest so far, per unit.
 
     Attributes:
-        t: (n,) s, the samples that both runs reached.
+        t: (n,) s, sample times that both runs reached.
         q: unit -> (n,) largest error of any coordinate of that unit up to t; the rotation error of
             a quaternion counts as rad.
         u: unit -> (n,) the same for speeds.
-        horizon: s; the runs part here, None if they do not.
+        horizon: s; predictability horizon, past which the runs differ too much; None without.
         tenfold: s in which errors grow tenfold, None if they do not grow exponentially.
-        reference: how the second run was made.
-        moved: unit -> how far coordinates of that unit went, against which errors are judged.
-        covered: s up to which the second run went where it failed before the end of the first:
-            nothing is known of the error beyond; None for the whole run.
+        reference: description of the second run.
+        moved: unit -> largest excursion of coordinates of that unit, the scale of their errors.
+        covered: s; end of the second run where it failed before the end of the first, so that the
+            error beyond is unknown; None for the whole run.
     """
 
     t: Array
@@ -92,72 +93,72 @@ class ErrorEstimate:
 
     @property
     def nowhere(self) -> bool:
-        """Whether the runs part at the first sample already behind the start, if not there."""
+        """True if the horizon is not after the first sample."""
         return self.horizon is not None and self.horizon <= self.t[0]
 
     def whole(self, kind: str = "q") -> dict[str, float]:
-        """Unit -> largest difference of the two runs as far as both went, as an error, whatever
-        the horizon."""
+        """Unit -> largest error of q or u over all common samples, also past the horizon."""
         values: dict[str, Array] = getattr(self, kind)
         return {unit: float(v.max(initial=0.0)) for unit, v in values.items()}
 
     def largest(self, kind: str = "q") -> dict[str, float]:
-        """Unit -> largest error of q or u before the horizon (as far as both runs went without
-        one)."""
+        """Unit -> largest error of q or u up to the horizon, or over all common samples."""
         within = self.t < np.inf if self.horizon is None else self.t <= self.horizon
         values: dict[str, Array] = getattr(self, kind)
         return {unit: float(v[within].max(initial=0.0)) for unit, v in values.items()}
 
 
 def reference_settings(first: Trajectory, breaks: Sequence[float] = ()) -> tuple[Settings, str]:
-    """Settings of the second run, sampled at the times of the first; and what to call it.
+    """Settings of the second run, sampled at the times of the first, and their description.
 
-    `breaks` are the times (s) at which the scene ends every step.
+    `breaks` are the times in s at which the scene ends every step.
     """
     settings, times = first.settings, tuple(np.unique(first.t).tolist())
     pieces = _pieces(settings, breaks)
     if settings.step is not None:
         half = settings.step / 2
-        cut = min(_typical(np.minimum(pieces, settings.step), pieces) / 2, pieces.sum() / _FEWEST)
-        step = min(half, cut) if cut > 0 else half
+        typical = _typical_length(np.minimum(pieces, settings.step), pieces)
+        max_step = min(typical / 2, pieces.sum() / _MIN_FIXED_STEPS)
+        step = min(half, max_step) if max_step > 0 else half
         name = "half the step" if step == half else "a shorter step"
         return replace(settings, step=step, output_times=times), f"{name}, {step:.6g} s"
-    factor = max(TIGHTER, _TIGHTEST / settings.rtol)
-    factor = factor if factor <= 0.1 else 10.0  # no room below: a looser run bounds the error too
-    rtol = min(settings.rtol * factor, _LOOSEST)
-    size = max(_size(first.q - first.q[:1]), _size(first.u))
-    atol = min(settings.atol * rtol / settings.rtol, max(_LOOSEST * size, _DUST))
-    bounds = [settings.max_step / 2, _ELSEWHERE * (first.statistics.largest_step or 0.0)]
+    factor = max(TIGHTER, _MIN_TOLERANCE / settings.rtol)
+    # If rtol cannot be tightened enough, a looser run bounds the error as well.
+    factor = factor if factor <= 0.1 else 10.0
+    rtol = min(settings.rtol * factor, _MAX_TOLERANCE)
+    size = max(_max_abs(first.q - first.q[:1]), _max_abs(first.u))
+    atol = min(settings.atol * rtol / settings.rtol, max(_MAX_TOLERANCE * size, _ROUNDING))
+    bounds = [settings.max_step / 2, _MAX_STEP_RATIO * (first.statistics.largest_step or 0.0)]
     if first.statistics.steps <= 2 * len(pieces):  # breaks and the end, not errors, set the steps
-        bounds.append(_typical(pieces, pieces) / 2)
-    longest = min((bound for bound in bounds if bound > 0.0), default=0.0)
+        bounds.append(_typical_length(pieces, pieces) / 2)
+    max_step = min((bound for bound in bounds if bound > 0.0), default=0.0)
     second = replace(
-        settings, rtol=rtol, atol=atol, output_times=times, max_step=longest,
+        settings, rtol=rtol, atol=atol, output_times=times, max_step=max_step,
         max_steps=6 * settings.max_steps,
-        first_step=0.3 * (first.statistics.smallest_step or 0.0),  # else both begin alike
+        first_step=0.3 * (first.statistics.smallest_step or 0.0),  # another start than the first
     )  # fmt: skip
     return second, f"rtol {second.rtol:.0e}"
 
 
 def _pieces(settings: Settings, breaks: Sequence[float]) -> Array:
-    """(m,) lengths in s of what breaks cut the run into, ascending."""
+    """Lengths (m,) in s of the pieces of a run between breaks, ascending."""
     start, end = settings.t_start, settings.t_end
     stops = [start, *(b for b in breaks if start < b < end), end]
     return np.sort(np.diff(stops))
 
 
-def _typical(sizes: Array, pieces: Array) -> float:
-    """The entry of `sizes` (m,), ascending, below which hardly any of the run lies."""
+def _typical_length(lengths: Array, pieces: Array) -> float:
+    """Entry of `lengths` (m,), ascending, below which only a negligible share of the run lies."""
     covered = np.cumsum(pieces)
-    return float(sizes[np.searchsorted(covered, _MINOR * covered[-1])])
+    return float(lengths[np.searchsorted(covered, _NEGLIGIBLE_SHARE * covered[-1])])
 
 
-def _size(values: Array) -> float:
+def _max_abs(values: Array) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
 def made_same_steps(first: Trajectory, second: Trajectory) -> bool:
-    """True if a second run made the very steps of the first one, so that it says nothing of it."""
+    """True if two runs made the same steps, so that their difference is no error estimate."""
     a, b = first.statistics, second.statistics
     counts = (a.steps, a.rejected, a.evaluations, a.smallest_step, a.largest_step)
     return counts == (b.steps, b.rejected, b.evaluations, b.smallest_step, b.largest_step)
@@ -170,41 +171,44 @@ def compare(
     reference: str,
     start: Array | None = None,
 ) -> ErrorEstimate:
-    """Estimate from two runs; the second one sampled at the times of the first.
+    """Error estimate from two runs; the second is sampled at the times of the first.
 
-    `start` (nq,) is q at the start, from which one sample alone is seen to have moved.
+    `start` (nq,) is q at the start, needed for the excursion if the first run has one sample only.
     """
-    t, ours, theirs = np.intersect1d(first.t, second.t, return_indices=True)
+    t, rows_1, rows_2 = np.intersect1d(first.t, second.t, return_indices=True)
     q, u = (
-        dict(_groups(layout, getattr(first, kind)[ours], getattr(second, kind)[theirs], kind))
+        _running_errors(layout, getattr(first, kind)[rows_1], getattr(second, kind)[rows_2], kind)
         for kind in ("q", "u")
     )
     path = first.q if start is None or len(first.q) > 1 else np.vstack([start, first.q])
     moved = excursions(layout, path)
     horizon = _horizon(t, q, moved, first.settings.t_start)
     covered = None if second.is_comparable else float(t[-1])
-    return ErrorEstimate(t, q, u, horizon, _tenfold(t, [*q.values()]), reference, moved, covered)
+    tenfold = _tenfold_time(t, [*q.values()])
+    return ErrorEstimate(t, q, u, horizon, tenfold, reference, moved, covered)
 
 
-def _groups(layout: Layout, a: Array, b: Array, kind: str) -> Iterator[tuple[str, Array]]:
-    """(unit, running maximum of SAFETY times the difference) for each unit."""
-    found: dict[str, Array] = {}
+def _running_errors(layout: Layout, a: Array, b: Array, kind: str) -> dict[str, Array]:
+    """Unit -> running maximum (n,) of SAFETY times the difference of two runs."""
+    errors: dict[str, Array] = {}
     for unit, difference in differences(layout, a, b, kind):
-        ahead = np.concatenate([difference, np.zeros(AHEAD)])
-        near = np.lib.stride_tricks.sliding_window_view(ahead, AHEAD + 1).max(axis=1)
-        error = np.maximum.accumulate(SAFETY * near)
-        found[unit] = np.maximum(found.get(unit, error), error)
-    yield from found.items()
+        padded = np.concatenate([difference, np.zeros(AHEAD)])
+        window_max = np.lib.stride_tricks.sliding_window_view(padded, AHEAD + 1).max(axis=1)
+        error = np.maximum.accumulate(SAFETY * window_max)
+        errors[unit] = np.maximum(errors.get(unit, error), error)
+    return errors
 
 
 def differences(
     layout: Layout, a: Array, b: Array, kind: str, but: str = ""
 ) -> Iterator[tuple[str, Array]]:
-    """(unit, largest difference (n,) of any coordinate of it), rotations apart from other angles;
-    none of the unit `but`."""
-    for unit, places in (layout.q_by_unit if kind == "q" else layout.u_by_unit).items():
+    """Pairs of unit and largest difference (n,) of its coordinates, without the unit `but`.
+
+    The rotation between quaternions is a further pair of unit rad.
+    """
+    for unit, indices in (layout.q_by_unit if kind == "q" else layout.u_by_unit).items():
         if unit != but:
-            yield unit, np.abs(a[:, places] - b[:, places]).max(axis=1)
+            yield unit, np.abs(a[:, indices] - b[:, indices]).max(axis=1)
     quaternions = layout.quaternions
     if kind == "q" and but != "rad" and len(quaternions):
         entries = quaternions[:, None] + np.arange(4)
@@ -213,50 +217,56 @@ def differences(
 
 def rotation_between(a: Array, b: Array) -> Array:
     """Angle (...) in rad between orientations given by unit quaternions (..., 4)."""
-    apart, other = a - b, a + b
-    chord = np.sqrt(np.minimum((apart * apart).sum(axis=-1), (other * other).sum(axis=-1)))
+    difference, total = a - b, a + b  # q and -q are the same orientation
+    chord = np.sqrt(
+        np.minimum((difference * difference).sum(axis=-1), (total * total).sum(axis=-1))
+    )
     return np.asarray(4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
 
 
-def limit(moved: Mapping[str, float], unit: str, angle: float, part: float) -> float:
-    """The error of coordinates of a unit that is bearable: an angle, or a part of how far they
-    went; of what hardly moves, rounding."""
-    return angle if unit == "rad" else max(part * moved.get(unit, 0.0), _DUST)
+def error_limit(moved: Mapping[str, float], unit: str, angle: float, part: float) -> float:
+    """Acceptable error of coordinates of a unit.
+
+    `angle` (rad) for angles, else `part` of the excursion `moved`, at least rounding.
+    """
+    return angle if unit == "rad" else max(part * moved.get(unit, 0.0), _ROUNDING)
 
 
 def excursions(layout: Layout, q: Array, but: str = "") -> dict[str, float]:
-    """Unit, other than `but` -> largest excursion from the first sample of any coordinate of it."""
-    found: dict[str, float] = {}
+    """Unit -> largest excursion from the first sample of its coordinates; not of the unit `but`."""
+    largest: dict[str, float] = {}
     for unit, difference in differences(layout, q, q[:1], "q", but):
         if len(difference):
-            found[unit] = max(found.get(unit, 0.0), float(difference.max()))
-    return found
+            largest[unit] = max(largest.get(unit, 0.0), float(difference.max()))
+    return largest
 
 
 def _horizon(t: Array, q: dict[str, Array], moved: dict[str, float], start: float) -> float | None:
-    """The last sample before the runs differ by more than ANGLE or PART; without one the start."""
-    limits = {unit: limit(moved, unit, ANGLE, PART) for unit in q}
-    parted = [
+    """Last sample before the runs differ by more than ANGLE or PART, `start` if the first does."""
+    limits = {unit: error_limit(moved, unit, ANGLE, PART) for unit in q}
+    first_above = [
         int(np.argmax(error > SAFETY * limits[unit]))
         for unit, error in q.items()
         if (error > SAFETY * limits[unit]).any()
     ]
-    if not parted:
+    if not first_above:
         return None
-    return float(t[min(parted) - 1]) if min(parted) else start
+    return float(t[min(first_above) - 1]) if min(first_above) else start
 
 
-def _tenfold(t: Array, errors: list[Array]) -> float | None:
-    """Time for ten times the error, from a straight line through its logarithm over time."""
+def _tenfold_time(t: Array, errors: list[Array]) -> float | None:
+    """Time in s for tenfold growth of the error; None if a power law fits better."""
     if not errors or len(t) < 8:
         return None
     error = np.max(errors, axis=0)
-    late = error >= max(_SMALLEST, 10 * error[len(t) // 10])
-    late &= error < ANGLE
-    if late.sum() < 5 or error[late][-1] < _GROWTH * error[late][0] / 10:
+    grows = error >= max(_MIN_ERROR, 10 * error[len(t) // 10])
+    grows &= error < ANGLE
+    if grows.sum() < 5 or error[grows][-1] < _EXPONENTIAL_GROWTH * error[grows][0] / 10:
         return None
-    slope, offset = np.polyfit(t[late], np.log10(error[late]), 1)
-    rest = np.log10(error[late]) - slope * t[late] - offset
-    powers = np.polyfit(np.log(t[late]), np.log10(error[late]), 1)
-    other = np.log10(error[late]) - np.polyval(powers, np.log(t[late]))
-    return float(1 / slope) if slope > 0 and rest.std() < other.std() else None
+    log_error = np.log10(error[grows])
+    slope, offset = np.polyfit(t[grows], log_error, 1)
+    exponential_residual = log_error - slope * t[grows] - offset
+    power_law = np.polyfit(np.log(t[grows]), log_error, 1)
+    power_residual = log_error - np.polyval(power_law, np.log(t[grows]))
+    is_exponential = slope > 0 and exponential_residual.std() < power_residual.std()
+    return float(1 / slope) if is_exponential else None

@@ -1,4 +1,4 @@
-"""One run of a model: the scene as the integrator's system, advanced in slices until it ends."""
+"""Run of a model by the C integrator, advanced in slices of wall time until it ends."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from ..integrate.steppers.implicit_methods import NewmarkFamily
 from ..packing.loops.unsupported_loops import reject_loop_method, reject_speed_constraints
 from ..platform_support.interrupts import record_interrupts
 from .method_switching import Choice
-from .run_notes import chattering_note, step_too_long_note, unseen
+from .run_notes import chattering_note, missed_switch_note, step_too_long_note
 from .scene_system import SceneSystem
-from .stop_messages import message_of, rest_of
+from .stop_messages import rest_note, stop_message
 from .trajectory import Trajectory
 
-#: Seconds between looks at progress, interrupts and checkpoints.
+#: Seconds of wall time between updates of progress, interrupts and checkpoints.
 SLICE = 0.1
 
-#: Bytes of samples at which a run stops and asks for output times.
-LARGEST = 2**30
+#: Bytes of samples at which a run without output times stops.
+MAX_SAMPLE_BYTES = 2**30
 
-#: Quaternions that are settled at once.
-_QUATERNIONS = 2**18
+#: Quaternions that are normalised at once.
+_QUATERNION_BLOCK = 2**18
 
-#: The energy (J) of a system at a time (s) in a state.
+#: Energy (J) of a system at a time (s) and a state.
 Energy = Callable[[SceneSystem, float, Array], float]
 
-#: The work is a by-product of a run: it may err by this many times rtol of the energy.
+#: Tolerance of the work, a by-product of a run, in multiples of rtol times the energy.
 _WORK_TOLERANCE = 10.0
 
 
@@ -45,34 +45,39 @@ def make_run(
     system: SceneSystem, settings: Settings, q: ArrayLike, u: ArrayLike,
     capacity: int | None = None, energy: Energy | None = None,
 ) -> Integrator:  # fmt: skip
-    """The integrator at the start of the run, with room for so many samples at a time; `energy` is
-    who knows that of the start."""
+    """Integrator at the start of a run, with a buffer of `capacity` samples.
+
+    `energy` computes the energy of the start; default `energy_at`.
+    """
     tableau = initial_method(system, settings)
     start = system.begin(settings.t_start, q, u)
-    if asks_positions(settings):
+    if uses_position_constraints(settings):
         system.ask_positions()
-    known = system.engine.packed.time_map(settings.t_start, settings.t_end)
+    time_map = system.engine.packed.time_map(settings.t_start, settings.t_end)
     return Integrator(
         system.engine.ffi, system.engine.lib, system.system, tableau, settings, start,
-        atol=tolerances(system, settings, start, energy), breaks=known.breaks,
-        bounds=(known.starts, known.longest), pole=known.pole, capacity=capacity,
+        atol=tolerances(system, settings, start, energy), breaks=time_map.breaks,
+        bounds=(time_map.starts, time_map.longest), pole=time_map.pole, capacity=capacity,
     )  # fmt: skip
 
 
 def initial_method(system: SceneSystem, settings: Settings) -> Tableau:
-    """The method by which a run begins, of a system that has what it asks for."""
+    """First method of a run; prepares the system for it.
+
+    Raises SceneError where the scene or the step does not suit the method.
+    """
     tableau = get(settings.first_method, settings.radius)
     if tableau.implicit:
         reject_loop_method(system.engine.packed, settings.method, settings.tangent)
-        if asks_positions(settings):
+        if uses_position_constraints(settings):
             reject_speed_constraints(system.engine.packed, settings.method)
         system.offer_tangent()
     check_steps(tableau, settings.step)
     return tableau
 
 
-def asks_positions(settings: Settings) -> bool:
-    """Whether steps ask rows of closed loops for positions where they end."""
+def uses_position_constraints(settings: Settings) -> bool:
+    """True if steps satisfy closed loops at position level at their ends, not at speed level."""
     tableau = get(settings.first_method, settings.radius)
     return isinstance(tableau, NewmarkFamily) and tableau.on_positions
 
@@ -80,19 +85,19 @@ def asks_positions(settings: Settings) -> bool:
 def tolerances(
     system: SceneSystem, settings: Settings, start: Array, energy: Energy | None = None
 ) -> Array:
-    """Absolute tolerance per component; that of the work follows the energy of the start (J)."""
-    found = np.full(len(start), settings.atol)
+    """Absolute tolerance per state component; that of the work is scaled by the start energy."""
+    atol = np.full(len(start), settings.atol)
     if system.with_power:
-        known = (energy or energy_at)(system, settings.t_start, start)
-        found[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * (known or 1.0)
-    return found
+        start_energy = (energy or energy_at)(system, settings.t_start, start)
+        atol[-1] = settings.atol + _WORK_TOLERANCE * settings.rtol * (start_energy or 1.0)
+    return atol
 
 
 def energy_at(system: SceneSystem, t: float, y: Array) -> float:
-    """Sum of the sizes of the energies of a state, J; 0 where the motion itself cannot be computed,
-    which the run will say.
+    """Sum of the absolute energies of a state in J.
 
-    Raises NumericalFailure where the motion can, but not what the state shows.
+    0 where the accelerations cannot be computed, which the run reports.  Raises NumericalFailure
+    where only the energy cannot be computed.
     """
     engine, memory = system.engine, system.memory
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
@@ -106,13 +111,13 @@ def energy_at(system: SceneSystem, t: float, y: Array) -> float:
         return 0.0
     raise NumericalFailure(
         failure
-        or f"the energy at t = {t:.9g} s is not finite; see "
-        "whether masses, speeds and stiffnesses are of the size that was meant"
+        or f"energy at t = {t:.9g} s: not finite; check masses, speeds and stiffnesses for "
+        "values far too large"
     )
 
 
-def choice_of(system: SceneSystem, settings: Settings, run: Integrator) -> Choice | None:
-    """The choice among methods that goes with a run that has just been made."""
+def method_choice(system: SceneSystem, settings: Settings, run: Integrator) -> Choice | None:
+    """Choice of method for a new run of method "auto", else None."""
     return Choice(system, settings, run) if settings.method == AUTO else None
 
 
@@ -122,9 +127,10 @@ def advance(
     steps: int = 0,
     choice: Choice | None = None,
 ) -> Status | None:
-    """Run to the end; None if an interrupt came first or the samples fill the memory they may take.
+    """Advance a run to its end and return its status.
 
-    `observe` is called between slices.  RUNNING when so many steps have been made in all.
+    None if it was interrupted or its samples reach MAX_SAMPLE_BYTES; RUNNING when it has made
+    `steps` steps in all.  `observe` is called between slices.
     """
     with record_interrupts() as interrupted:
         while True:
@@ -136,7 +142,7 @@ def advance(
                 return status
             if observe is not None:
                 observe(run)
-            if interrupted or run.kept_bytes > LARGEST:
+            if interrupted or run.kept_bytes > MAX_SAMPLE_BYTES:
                 return None
 
 
@@ -148,32 +154,32 @@ def trajectory(
     message: str,
     earlier: Samples | None = None,
 ) -> Trajectory:
-    """Samples of a run, behind those of an earlier process, split into q, u and work."""
+    """Trajectory of a run, after the samples of an earlier process."""
     samples = run.samples if earlier is None else Samples.joined([earlier, run.samples])
     failure = run.failure
-    if status is Status.STOPPED and rest_of(system, run.event):
+    if status is Status.STOPPED and rest_note(system, run.event):
         status = Status.CAME_TO_REST
-    found = split(
+    result = split(
         system, samples, settings, status, message, run.statistics, (run.t, run.y),
         None if failure is None else failure.time,
     )  # fmt: skip
-    held = () if run.chatter is None else (chattering_note(system, run.chatter),)
-    missed = () if run.unseen is None else (unseen(system, *run.unseen),)
-    risks = (*held, *missed, *step_too_long_note(found))
-    return replace(found, risks=risks) if risks else found
+    chattering = () if run.chatter is None else (chattering_note(system, run.chatter),)
+    missed = () if run.unseen is None else (missed_switch_note(system, *run.unseen),)
+    risks = (*chattering, *missed, *step_too_long_note(result))
+    return replace(result, risks=risks) if risks else result
 
 
 def status_message(system: SceneSystem, run: Integrator, status: Status | None) -> str:
-    """How a run came back, as a sentence; None for interrupted."""
-    return _interrupted(run) if status is None else message_of(system, run)
+    """Sentence on the status of a run; status None means interrupted."""
+    return _interrupt_message(run) if status is None else stop_message(system, run)
 
 
-def _interrupted(run: Integrator) -> str:
-    if run.kept_bytes <= LARGEST:
+def _interrupt_message(run: Integrator) -> str:
+    if run.kept_bytes <= MAX_SAMPLE_BYTES:
         return f"interrupted at t = {run.t:.9g} s"
     return (
         f"interrupted at t = {run.t:.9g} s, because the samples of all steps fill "
-        f"{run.kept_bytes / 2**30:.1f} GiB; ask for output times, or see whether the scene is stiff"
+        f"{run.kept_bytes / 2**30:.1f} GiB; give output times, or check whether the scene is stiff"
     )
 
 
@@ -187,12 +193,13 @@ def split(
     last: tuple[float, Array],
     fail_time: float | None = None,
 ) -> Trajectory:
-    """Trajectory of samples; with output times only those, not the events between."""
+    """Split samples into the arrays of a trajectory; keep only output times if these are given."""
     times = settings.output_times
     if times is not None and (samples.t.tolist() != list(times) or samples.event.any()):
-        wanted = _among(samples.t, np.asarray(times)) & (samples.event >= 0)
-        behind = np.append(samples.t[1:] != samples.t[:-1], True)  # an event at such a time
-        keep = wanted & behind[: len(wanted)]
+        is_output = _is_among(samples.t, np.asarray(times)) & (samples.event >= 0)
+        # An event at an output time has several samples: keep the state after it.
+        is_last = np.append(samples.t[1:] != samples.t[:-1], True)
+        keep = is_output & is_last[: len(is_output)]
         samples = Samples(
             samples.t[keep], samples.y[keep], samples.memory[keep], samples.event[keep]
         )
@@ -206,45 +213,45 @@ def split(
     )  # fmt: skip
 
 
-def _among(t: Array, times: Array) -> NDArray[np.bool_]:
-    """Which of `t` are among the increasing `times`."""
+def _is_among(t: Array, times: Array) -> NDArray[np.bool_]:
+    """Mask (n,) of the `t` (n,) that are among the increasing `times`."""
     if not len(times):
         return np.zeros(len(t), bool)
     return np.asarray(times[np.minimum(np.searchsorted(times, t), len(times) - 1)] == t)
 
 
-def _moved(engine: LoopedEngine) -> bool:
-    """Whether drives or closed loops decide on some coordinates."""
+def _has_constraints(engine: LoopedEngine) -> bool:
+    """True if drives or closed loops determine some coordinates."""
     return bool(engine.packed.system.driven or engine.packed.system.closes)
 
 
-def settles(engine: LoopedEngine) -> bool:
-    """Whether states of steps may differ from what a result has."""
-    return _moved(engine) or bool(len(engine.packed.layout.quaternions))
+def needs_projection(engine: LoopedEngine) -> bool:
+    """True if `project_samples` may change the states of steps."""
+    return _has_constraints(engine) or bool(len(engine.packed.layout.quaternions))
 
 
 def project_samples(system: SceneSystem, t: Array, y: Array, memory: Array) -> tuple[Array, float]:
-    """Samples (n, n_state) with unit quaternions, exact driven coordinates and closed loops.
+    """Project samples (n, n_state) onto unit quaternions, exact drives and closed loops.
 
-    Between steps the samples are the method's dense output, which meets these only within the
-    tolerance.  Also returns the largest distance of a quaternion's length from 1.
+    Between steps the samples are the method's dense output, which satisfies these only within the
+    tolerance.  Also returns the largest deviation of a quaternion's length from 1.
     """
     engine, y, residual = system.engine, y.copy(), 0.0
-    if not settles(engine):
+    if not needs_projection(engine):
         return y, residual
     quaternions = engine.packed.layout.quaternions
     entries = quaternions[:, None] + np.arange(4) if len(quaternions) else quaternions
-    rows = max(1, _QUATERNIONS // max(1, len(entries)))
-    for first in range(0, len(y) if len(entries) else 0, rows):
-        some = y[first : first + rows]
-        lengths = np.sqrt(np.sum(some[:, entries] ** 2, axis=2))
+    row_count = max(1, _QUATERNION_BLOCK // max(1, len(entries)))
+    for first in range(0, len(y) if len(entries) else 0, row_count):
+        block = y[first : first + row_count]
+        lengths = np.sqrt(np.sum(block[:, entries] ** 2, axis=2))
         residual = max(residual, float(np.max(np.abs(lengths - 1), initial=0.0)))
-        with np.errstate(invalid="ignore"):  # a quaternion of zeros is named by the run itself
-            some[:, entries] /= lengths[:, :, None]
-    if _moved(engine):
-        times, known = np.ascontiguousarray(t), memory.copy()
+        with np.errstate(invalid="ignore"):  # the run itself reports a quaternion of zeros
+            block[:, entries] /= lengths[:, :, None]
+    if _has_constraints(engine):
+        times, row_memory = np.ascontiguousarray(t), memory.copy()
         engine.lib.mstmm_scene_settle_many(
-            system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(known),
+            system.run, len(y), y.shape[1], engine.pointer(times), engine.pointer(row_memory),
             engine.pointer(y),
         )  # fmt: skip
     return y, residual

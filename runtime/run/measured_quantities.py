@@ -1,4 +1,4 @@
-"""What a state shows, by C: expressions of quantities that a run can look at as it goes."""
+"""Expressions of quantities that C evaluates during a run, for outputs and controllers."""
 
 from __future__ import annotations
 
@@ -33,17 +33,19 @@ from ..packing.coordinate_layout import HingeSlots
 from ..packing.expression_tapes import inputs_port, state_ports
 from ..packing.packed_scene import PackedScene, resize_workspace
 
-#: Where a number stands: the port of the tape and the place in it.
-Place = tuple[str, int]
-_SHOWN = ("points", "loads", "efforts", "udot", "sums")
+#: Port of the tape, and index in it.
+Slot = tuple[str, int]
+
+#: Ports that need an observation of the state.
+_OBSERVED_PORTS = ("points", "loads", "efforts", "udot", "sums")
 
 
 class MeasuredQuantities:
-    """`record` is `mstmm_measure *` of expressions; `numbers` are how many they are.
+    """Expressions of measured quantities as a C record.
 
-    `others` are names that could have been given, too.
-
-    Raises SceneError for a name of what a run cannot look at.
+    `record` is their `mstmm_measure *`, `numbers` their count.  `others` are further valid names,
+    suggested for a misspelt one.  Raises SceneError for a quantity that cannot be measured during a
+    run.
     """
 
     def __init__(
@@ -53,7 +55,7 @@ class MeasuredQuantities:
         self._references = BodyReferences(engine.packed.described.skeleton)
         self._probes: dict[str, int] = {}
         self._read = set[str]()
-        nodes = [one.build(self._graph, self._node) for one in expressions]
+        nodes = [expression.build(self._graph, self._node) for expression in expressions]
         self.numbers = len(nodes)
         packed, lib, ffi = engine.packed, engine.lib, engine.ffi
         sizes = {
@@ -67,19 +69,20 @@ class MeasuredQuantities:
         kernel = self._graph.kernel(
             "measured", ports, [Port("values", (len(nodes),))], {"values": nodes}
         )
-        tape, self._kept = compile_tape(kernel), list[object]()
+        tape, self._keep_alive = compile_tape(kernel), list[object]()
         resize_workspace(packed, tape.slots)
         self.record = ffi.new("mstmm_measure *")
-        self.record.tape, self.record.observes = c_tape(ffi, tape, self._kept), bool(self._read)
-        shown = self.record.shown
+        self.record.tape = c_tape(ffi, tape, self._keep_alive)
+        self.record.observes = bool(self._read)
+        observation = self.record.shown
         for name, n in sizes.items():
             array = np.zeros(max(1, n))
-            self._kept.append(array)
+            self._keep_alive.append(array)
             if name in self._read:
-                setattr(shown, name, engine.pointer(array))
-        records = engine.probes([Probe(*packed.end(one)) for one in self._probes])
-        shown.n_probes, shown.probes = len(self._probes), records
-        self._kept.append(records)
+                setattr(observation, name, engine.pointer(array))
+        records = engine.probes([Probe(*packed.end(reference)) for reference in self._probes])
+        observation.n_probes, observation.probes = len(self._probes), records
+        self._keep_alive.append(records)
 
     def _node(self, name: Name) -> Node:
         graph, inputs = self._graph, self._engine.packed.layout.inputs
@@ -88,32 +91,35 @@ class MeasuredQuantities:
         if name.text in inputs:
             return input_node(inputs[name.text], graph.element("t", 0))
         if name.text == "energy":
-            a, b, c = (self._element(("sums", k)) for k in range(3))
-            return a + b + c
-        place = self._of_scene(name.text) or self._of_owner(name.text)
-        if place is None:
+            kinetic, gravity, springs = (self._element(("sums", k)) for k in range(3))
+            return kinetic + gravity + springs
+        slot = self._scene_slot(name.text) or self._owner_slot(name.text)
+        if slot is None:
             raise SceneError(
-                f'"{name.text}": this cannot be looked at within a run{self._meant(name.text)}; '
-                "of hinges there are coordinates, speeds, accelerations, efforts, components of "
-                "force and moment, of bodies and ends components of position, velocity, "
-                "acceleration and of their turning (no quaternions), of the scene energies, power "
-                "and momenta"
+                f'"{name.text}": this quantity cannot be measured during a run'
+                f"{self._suggestion(name.text)}; expected a coordinate, speed, acceleration, "
+                "effort, or a component of force or moment of a hinge; a component of position, "
+                "velocity, acceleration, angular velocity or angular acceleration of a body or an "
+                "end (no quaternions); or an energy, the power or a momentum of the scene"
             )
-        return self._element(place)
+        return self._element(slot)
 
-    def _meant(self, text: str) -> str:
-        """The nearest of the names of coordinates, speeds and others, if one is near."""
+    def _suggestion(self, text: str) -> str:
+        """Suggestion of a similar valid name, "" if none is similar."""
         hinges = self._engine.packed.layout.hinges.items()
-        known = [f"{owner}.{x}" for owner, one in hinges for x in (*one.q_names, *one.u_names)]
-        found = did_you_mean(text, [*self._others, *known])
-        return found if "did you mean" in found else ""
+        names = [
+            f"{hinge}.{x}" for hinge, slots in hinges for x in (*slots.q_names, *slots.u_names)
+        ]
+        suggestion = did_you_mean(text, [*self._others, *names])
+        return suggestion if "did you mean" in suggestion else ""
 
-    def _element(self, place: Place) -> Node:
-        if place[0] in _SHOWN:
-            self._read.add(place[0])
-        return self._graph.element(*place)
+    def _element(self, slot: Slot) -> Node:
+        if slot[0] in _OBSERVED_PORTS:
+            self._read.add(slot[0])
+        return self._graph.element(*slot)
 
-    def _of_scene(self, text: str) -> Place | None:
+    def _scene_slot(self, text: str) -> Slot | None:
+        """Slot of a quantity of the whole scene, such as "momentum.x"; None if `text` is none."""
         for name, (_, _, columns) in SUMS.items():
             if text == name and columns.stop == columns.start + 1:
                 return "sums", columns.start
@@ -123,105 +129,107 @@ class MeasuredQuantities:
                     return "sums", columns.start + "xyz".index(label)
         return None
 
-    def _of_owner(self, text: str) -> Place | None:
+    def _owner_slot(self, text: str) -> Slot | None:
+        """Slot of a quantity of a hinge, a body or an end; None if there is none."""
         parts = text.split(".")
         packed = self._engine.packed
         for k in range(len(parts) - 1, 0, -1):
-            owner, rest = ".".join(parts[:k]), ".".join(parts[k:])
-            slots = packed.layout.hinges.get(owner) or packed.layout.modal.get(owner)
-            place = None if slots is None else self._of_hinge(slots, owner, rest)
+            owner, quantity = ".".join(parts[:k]), ".".join(parts[k:])
+            coordinates = packed.layout.hinges.get(owner) or packed.layout.modal.get(owner)
+            slot = None if coordinates is None else self._hinge_slot(coordinates, owner, quantity)
             reference = self._references.canonical(owner)
-            if place is None and reference is not None:
-                place = self._of_end(reference, rest)
-            if place is not None:
-                return place
+            if slot is None and reference is not None:
+                slot = self._end_slot(reference, quantity)
+            if slot is not None:
+                return slot
         return None
 
-    def _of_hinge(self, slots: HingeSlots, owner: str, rest: str) -> Place | None:
-        groups = [("q", "q", slots.q, slots.q_names), ("u", "u", slots.u, slots.u_names)]
-        rates = [acceleration_name(name) for name in slots.u_names]
-        groups.append(("udot", "udot", slots.u, tuple(rates)))
-        modal = owner in self._engine.packed.layout.modal
-        if not modal:
-            efforts = tuple(effort_names(slots.u_names))
-            groups.append(("efforts", "effort", slots.u, efforts))
+    def _hinge_slot(self, coordinates: HingeSlots, owner: str, quantity: str) -> Slot | None:
+        q, u, u_names = coordinates.q, coordinates.u, coordinates.u_names
+        groups = [("q", "q", q, coordinates.q_names), ("u", "u", u, u_names)]
+        groups.append(("udot", "udot", u, tuple(acceleration_name(name) for name in u_names)))
+        is_modal = owner in self._engine.packed.layout.modal
+        if not is_modal:
+            groups.append(("efforts", "effort", u, tuple(effort_names(u_names))))
         for port, short, first, names in groups:
-            known = [*names, *(f"{short}[{k}]" for k in range(len(names)))]
-            known += [short] if len(names) == 1 else []
-            if rest in known:
-                return port, first + known.index(rest) % len(names)
-        if modal:
+            aliases = [*names, *(f"{short}[{k}]" for k in range(len(names)))]
+            aliases += [short] if len(names) == 1 else []
+            if quantity in aliases:
+                return port, first + aliases.index(quantity) % len(names)
+        if is_modal:
             return None
         body = self._engine.packed.hinge_position[owner]
-        for first, (kind, about) in enumerate(HINGE_QUANTITIES.items()):
-            for axis, label in enumerate(about.labels):
-                if rest in (f"{kind}.{label}", about.short[axis]):
-                    return "loads", 6 * body + 3 * first + axis
+        for block, (kind, description) in enumerate(HINGE_QUANTITIES.items()):
+            for axis, label in enumerate(description.labels):
+                if quantity in (f"{kind}.{label}", description.short[axis]):
+                    return "loads", 6 * body + 3 * block + axis
         return None
 
-    def _of_end(self, reference: str, rest: str) -> Place | None:
+    def _end_slot(self, reference: str, quantity: str) -> Slot | None:
         for kind, columns in POINT_COLUMNS.items():
-            about = BODY_QUANTITIES[kind]
-            for axis, label in enumerate(about.labels):
-                if rest in (f"{kind}.{label}", about.short[axis]):
+            description = BODY_QUANTITIES[kind]
+            for axis, label in enumerate(description.labels):
+                if quantity in (f"{kind}.{label}", description.short[axis]):
                     probe = self._probes.setdefault(reference, len(self._probes))
                     width = int(self._engine.lib.MSTMM_PROBE_NUMBERS)
                     return "points", width * probe + columns.start + axis
         return None
 
     def at(self, run: Any, t: float, y: Array) -> Array:
-        """The numbers at a state y (n_state,) of a scene's run, `mstmm_scene_run *`."""
-        found, state = np.zeros(max(1, self.numbers)), np.ascontiguousarray(y)
-        pointers = self._engine.pointer(state), self._engine.pointer(found)
+        """Values (numbers,) at time t (s) and state y (n_state,); `run` is a `mstmm_scene_run *`.
+
+        Raises NumericalFailure where the state cannot be evaluated.
+        """
+        values, state = np.zeros(max(1, self.numbers)), np.ascontiguousarray(y)
+        pointers = self._engine.pointer(state), self._engine.pointer(values)
         if self._engine.lib.mstmm_measured(run, self.record, t, *pointers):
             raise NumericalFailure(self._engine.failure_text(run.failure, t))
-        return found[: self.numbers]
+        return values[: self.numbers]
 
 
-def refuse_one_way(packed: PackedScene, what: str) -> None:
-    """SceneError for bodies whose deflection is found behind a whole run: within one there is
-    nothing of it to see."""
+def reject_one_way(packed: PackedScene, where: str) -> None:
+    """Raise SceneError for one-way bodies, whose deflection is only known after the run."""
     rigidified = packed.expanded.rigidified
     for name in rigidified.one_way if rigidified is not None else ():
         raise SceneError(
-            f'"{name}": {what} sees nothing of the deflection of a body with model = "one-way", '
-            'which is found behind a whole run; take model = "flexible" or "rigid"'
+            f'"{name}": {where} cannot use a body with model = "one-way", because its deflection '
+            'is computed after the run; use model = "flexible" or "rigid"'
         )
 
 
 class MeasuredOutputs:
-    """The outputs of a scene that C gives; `others` are the names of those that it does not."""
+    """Outputs of a scene that C evaluates; `others` are the names of the remaining outputs."""
 
     def __init__(self, engine: LoopedEngine) -> None:
-        self.others, self._labels = list[str](), dict[str, int]()
+        self.others, self._sizes = list[str](), dict[str, int]()
         expressions = list[Expression]()
         for output in engine.packed.described.output:
-            found = _of_output(engine, output)
-            expressions += found
-            self._labels[output.name] = len(found)
-            self.others += [] if found else [output.name]
+            components = _output_expressions(engine, output)
+            expressions += components
+            self._sizes[output.name] = len(components)
+            self.others += [] if components else [output.name]
         self._measured = MeasuredQuantities(engine, expressions)
 
     def at(self, run: Any, t: float, y: Array) -> dict[str, Any]:
-        """Numbers, and arrays of vectors, by the names of outputs."""
-        numbers, found, first = self._measured.at(run, t, y), dict[str, Any](), 0
-        for name, count in self._labels.items():
-            if count:
-                part = numbers[first : first + count]
-                found[name] = float(part[0]) if count == 1 else part
-            first += count
-        return found
+        """Output name -> number or vector (3,) at time t (s) and state y (n_state,)."""
+        values, outputs, first = self._measured.at(run, t, y), dict[str, Any](), 0
+        for name, size in self._sizes.items():
+            if size:
+                components = values[first : first + size]
+                outputs[name] = float(components[0]) if size == 1 else components
+            first += size
+        return outputs
 
 
-def _of_output(engine: LoopedEngine, output: Output) -> list[Expression]:
-    """What gives an output: an expression, or one for each component; none where C does not."""
+def _output_expressions(engine: LoopedEngine, output: Output) -> list[Expression]:
+    """Expressions of an output, one per component; empty where C cannot evaluate it."""
     for labels in ([""], [".x", ".y", ".z"]):
         try:
-            found = [output.of] if labels == [""] else [
+            expressions = [output.of] if labels == [""] else [
                 parse(output.of.text + label) for label in labels
             ]  # fmt: skip
-            MeasuredQuantities(engine, found)
+            MeasuredQuantities(engine, expressions)
         except (SceneError, ExpressionError):  # a component of a sum is no expression
             continue
-        return found
+        return expressions
     return []

@@ -1,4 +1,4 @@
-"""Which methods made a run, where the run itself chose among them."""
+"""Segments of a run of method "auto", each computed by one method."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 
 @dataclass(frozen=True)
 class MethodSegment:
-    """A part of a run that one method made.
+    """Part of a run that one method computed.
 
     Attributes:
-        t: where it begins, s.
-        method: its name.
-        rate: |lambda| of the fastest motion of laws and modes there, 1/s; None if nobody asked.
-        why: in words.
+        t: start of the segment, s.
+        method: name of the method.
+        rate: |lambda| of the fastest motion of laws and modes at t, 1/s; None if not computed.
+        why: reason for the method.
     """
 
     t: float
@@ -29,11 +29,11 @@ class MethodSegment:
 
 
 def from_rows(rows: Sequence[dict[str, Any]]) -> tuple[MethodSegment, ...]:
-    """Stretches from plain data.  TypeError or KeyError where that is something else."""
-    found = []
+    """Segments from a list of dictionaries; TypeError or KeyError for invalid ones."""
+    segments = []
     for row in rows:
         t, rate = row["t"], row["rate"]
         if not all(isinstance(x, (int, float)) for x in (t, 0.0 if rate is None else rate)):
-            raise TypeError(f"{row!r} is no part of a run")
-        found.append(MethodSegment(float(t), str(row["method"]), rate, str(row["why"])))
-    return tuple(found)
+            raise TypeError(f"method segment: expected numbers t and rate, found {row!r}")
+        segments.append(MethodSegment(float(t), str(row["method"]), rate, str(row["why"])))
+    return tuple(segments)

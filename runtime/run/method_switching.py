@@ -1,10 +1,10 @@
-"""`method = "auto"`: an explicit method, and an implicit one where stability sets its steps.
+"""`method = "auto"`: switch between an explicit and an implicit method within a run.
 
-A run starts by dop853.  What its steps say of stability costs nothing; when most of the last ones
-were as long as it allows, the fastest motion that laws and modes cause is estimated.  If that is
-what holds the steps back, and fast against the whole run, the run goes on by a Rosenbrock method,
-and back once the steps of that one would be stable for an explicit method as well.  A run that is
-not stiff has the numbers of dop853, to the last bit.
+A run starts with dop853, whose steps detect the stability limit at no cost.  When most of the last
+steps reached that limit, the fastest motion due to laws and modes is estimated.  If this motion
+limits the steps and is fast compared with the whole run, the run continues with a Rosenbrock
+method, and returns to dop853 once the steps would be stable for an explicit method.  The results of
+a run that is not stiff equal those of dop853 bit by bit.
 """
 
 from __future__ import annotations
@@ -23,73 +23,76 @@ from .method_segments import MethodSegment, from_rows
 from .scene_system import SceneSystem
 from .spectral_radius import FastestMode
 
-#: Of the last steps so many have to speak for a change: to an implicit method, and back.
-_STIFF, _NOT_STIFF = 5, 10
+#: Number of recent steps that must indicate a change: to an implicit method, and back.
+_STIFF_STEPS, _NONSTIFF_STEPS = 5, 10
 
 #: h |lambda| up to which a step of an explicit method is stable.
-_STABLE = 2.5
+_STABLE_PRODUCT = 2.5
 
-#: |lambda| times the time of a run up to which an explicit method costs less whatever limits it.
-_FEW = 2000.0
+#: |lambda| times the duration of a run up to which an explicit method always costs less.
+_EXPLICIT_PRODUCT = 2000.0
 
-#: Tolerances from this on are met at less cost by the method of lower order.
-_LOOSE = 1e-5
+#: Tolerance from which on the implicit method of lower order costs less.
+_LOOSE_RTOL = 1e-5
 
 
 def implicit_method(rtol: float) -> str:
-    """Which implicit method `auto` takes for a tolerance."""
-    return "rodas4p2" if rtol >= _LOOSE else "rodas5p"
+    """Implicit method that "auto" uses for a tolerance."""
+    return "rodas4p2" if rtol >= _LOOSE_RTOL else "rodas5p"
 
 
 class Choice:
-    """The choice of method within one run; `look` between its slices."""
+    """Choice of method within one run; call `look` between its slices."""
 
     def __init__(self, system: SceneSystem, settings: Settings, run: Integrator) -> None:
         self._system, self._settings = system, settings
         self._fastest: FastestMode | None = None
-        self._asked_for = (_STIFF, 0, 0.0)
-        self._since = 0  # steps of the run before the present method
+        self._request = (_STIFF_STEPS, 0, 0.0)
+        self._first_step = 0  # steps of the run before the present method
         self.stretches = [
-            MethodSegment(settings.t_start, AUTO_EXPLICIT, None, "every run starts so")
+            MethodSegment(settings.t_start, AUTO_EXPLICIT, None, "initial method of every run")
         ]
-        run.call_back(*self._asked_for)
+        run.call_back(*self._request)
 
     def look(self, run: Integrator) -> None:
-        """Change the method if the run asked for a look and its steps say so."""
-        rate = self._rate(run) if run.asked else None
+        """Change the method if the run returned for that and its steps indicate it."""
+        rate = self._fastest_rate(run) if run.asked else None
         if rate is None:
             return
         if run.tableau.implicit:
-            self._look_back(run, rate)
+            self._check_nonstiff(run, rate)
         elif self._is_stiff(run, rate):
-            self._change(run, implicit_method(self._settings.rtol), rate)
+            self._change_method(run, implicit_method(self._settings.rtol), rate)
         else:
-            self._ask(run, 2 * self._asked_for[0])
+            self._request_return(run, 2 * self._request[0])
 
     def rescue(self, run: Integrator) -> bool:
-        """Let a run that failed for want of an implicit step go on explicitly, to its end.
+        """Continue explicitly, to the end, a run whose implicit method found no step.
 
-        Returns whether it does.
+        Returns whether the run continues.
         """
         if not (run.tableau.implicit and run.no_step):
             return False
-        why = f"{run.tableau.name} finds no step"
+        reason = f"{run.tableau.name} found no step"
         run.change(get(AUTO_EXPLICIT))
-        self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, why))
-        self._ask(run, 0)
+        self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, reason))
+        self._request_return(run, 0)
         return True
 
-    def _rate(self, run: Integrator) -> float | None:
-        """|lambda| where the run stands, 0 where it cannot be computed, which the run will say.
-        None, and no further questions, for scenes without implicit methods."""
+    def _fastest_rate(self, run: Integrator) -> float | None:
+        """|lambda| in 1/s at the present state, 0 where it cannot be computed.
+
+        None, and no further requests, for scenes that no implicit method supports.
+        """
         system, engine = self._system, self._system.engine
         if self._fastest is None:
             try:
                 reject_qr_steps(engine.packed)
                 self._fastest = FastestMode(engine, system.memory)
             except SceneError as error:
-                self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, f"stays: {error}"))
-                self._ask(run, 0)
+                reason = f"no implicit method: {error}"
+                self.stretches.append(MethodSegment(run.t, AUTO_EXPLICIT, None, reason))
+                self._request_return(run, 0)
                 return None
         q, u = run.y[: engine.nq], run.y[engine.nq : engine.nq + engine.nu]
         try:
@@ -99,55 +102,61 @@ class Choice:
 
     def _is_stiff(self, run: Integrator, rate: float) -> bool:
         span = self._settings.t_end - self._settings.t_start
-        return rate * span > _FEW and rate * run.last_step > _STABLE
+        return rate * span > _EXPLICIT_PRODUCT and rate * run.last_step > _STABLE_PRODUCT
 
-    def _look_back(self, run: Integrator, rate: float) -> None:
-        """After 10, 20, 40, ... implicit steps, or when so many were short for an explicit one."""
-        if run.signs >= _NOT_STIFF and rate * run.last_step < _STABLE:
-            self._change(run, AUTO_EXPLICIT, rate)
+    def _check_nonstiff(self, run: Integrator, rate: float) -> None:
+        """Return to the explicit method if enough implicit steps were short enough for it.
+
+        Checked after 10, 20, 40, ... implicit steps, or when that many of them were short enough.
+        """
+        if run.signs >= _NONSTIFF_STEPS and rate * run.last_step < _STABLE_PRODUCT:
+            self._change_method(run, AUTO_EXPLICIT, rate)
             return
-        gone = max(_NOT_STIFF, run.steps - self._since)
-        signs = run.signs + _NOT_STIFF if run.signs >= _NOT_STIFF else _NOT_STIFF
-        self._ask(run, signs, self._since + 2 * gone, _short(rate))
+        count = max(_NONSTIFF_STEPS, run.steps - self._first_step)
+        signs = run.signs + _NONSTIFF_STEPS if run.signs >= _NONSTIFF_STEPS else _NONSTIFF_STEPS
+        self._request_return(run, signs, self._first_step + 2 * count, _stable_step(rate))
 
-    def _change(self, run: Integrator, method: str, rate: float) -> None:
+    def _change_method(self, run: Integrator, method: str, rate: float) -> None:
         implicit = method != AUTO_EXPLICIT
         steps = run.steps
         if implicit:
             self._system.offer_tangent()
         run.change(get(method))
-        why = "stability set the steps" if implicit else "its steps are stable for it"
-        self.stretches.append(MethodSegment(run.t, method, rate, why))
-        self._since = steps
+        reason = "stability limited the steps" if implicit else "stable at the present step size"
+        self.stretches.append(MethodSegment(run.t, method, rate, reason))
+        self._first_step = steps
         if implicit:
-            self._ask(run, _NOT_STIFF, steps + _NOT_STIFF, _short(rate))
+            self._request_return(run, _NONSTIFF_STEPS, steps + _NONSTIFF_STEPS, _stable_step(rate))
         else:
-            self._ask(run, _STIFF)
+            self._request_return(run, _STIFF_STEPS)
 
-    def _ask(self, run: Integrator, signs: int, look: int = 0, short: float = 0.0) -> None:
-        self._asked_for = (signs, look, short)
-        run.call_back(*self._asked_for)
+    def _request_return(
+        self, run: Integrator, signs: int, steps: int = 0, short: float = 0.0
+    ) -> None:
+        """Make the C loop return after `signs` indications, or at `steps` steps (0: never)."""
+        self._request = (signs, steps, short)
+        run.call_back(*self._request)
 
     # --- checkpoints ----------------------------------------------------------------------------
 
     def state(self) -> str:
-        """Everything that a new process needs, as text."""
+        """State of the choice as JSON text, for a checkpoint."""
         return json.dumps({
             "stretches": [asdict(s) for s in self.stretches],
-            "asked_for": self._asked_for, "since": self._since,
+            "asked_for": self._request, "since": self._first_step,
         })  # fmt: skip
 
     def restore(self, run: Integrator, state: str) -> None:
-        """Put the choice where `state` was taken, and its method into the run; then restore that.
+        """Restore the choice from `state` and set its method in the run, before that is restored.
 
-        Raises ValueError for a text that no choice wrote.
+        Raises ValueError for an invalid text.
         """
         try:
-            found = json.loads(state)
-            self.stretches = list(from_rows(found["stretches"]))
-            signs, look, short = found["asked_for"]
-            self._asked_for = (int(signs), int(look), float(short))
-            self._since = int(found["since"])
+            data = json.loads(state)
+            self.stretches = list(from_rows(data["stretches"]))
+            signs, steps, short = data["asked_for"]
+            self._request = (int(signs), int(steps), float(short))
+            self._first_step = int(data["since"])
             method = self.stretches[-1].method
         except (KeyError, TypeError, IndexError) as error:
             raise ValueError(str(error)) from None
@@ -156,8 +165,9 @@ class Choice:
         if method != AUTO_EXPLICIT:
             self._system.offer_tangent()
             run.change(get(method))
-        run.call_back(*self._asked_for)
+        run.call_back(*self._request)
 
 
-def _short(rate: float) -> float:
-    return _STABLE / rate if rate > 0.0 else math.inf
+def _stable_step(rate: float) -> float:
+    """Longest step in s that an explicit method takes stably at |lambda| = `rate` (1/s)."""
+    return _STABLE_PRODUCT / rate if rate > 0.0 else math.inf

@@ -1,4 +1,4 @@
-"""What a run could not see, locate or resolve."""
+"""Risks of switches, narrow features and step sizes that a run did not resolve."""
 
 from __future__ import annotations
 
@@ -17,35 +17,36 @@ if TYPE_CHECKING:
     from .scene_system import SceneSystem
     from .trajectory import Trajectory
 
-#: Part of the way covered that fixed steps may err by, by their own estimate, without a word.
-_PART = 0.02
+#: Largest estimated error of fixed steps, relative to the distance travelled, without a risk.
+_MAX_ERROR = 0.02
 
-#: The step that is named instead is to err by this part of it.
-_SURE = 0.5
+#: Error of the recommended step, relative to _MAX_ERROR.
+_TARGET = 0.5
 
 
 def unmapped_expression_notes(packed: PackedScene, settings: Settings) -> tuple[Risk, ...]:
-    """Of the expressions of a scene: those that could not be mapped, or that a fixed step may pass
-    over."""
-    known = packed.time_map(settings.t_start, settings.t_end)
-    found = list(known.notes)
+    """Risks of expressions of time that could not be mapped or that a fixed step may miss."""
+    time_map = packed.time_map(settings.t_start, settings.t_end)
+    risks = list(time_map.notes)
     if settings.step is not None:
-        found += [risk] if (risk := known.too_long(settings.step)) else []
+        risks += [risk] if (risk := time_map.too_long(settings.step)) else []
     count = len(packed.watched.switches)
     if count > MOST:
-        found.append(Risk(
+        risks.append(Risk(
             "switches", RUN,
-            f"more than {MOST} conditions depend on the motion; those behind the first {MOST} do "
-            "not end a step where they switch", "give max_step so that none is passed over",
+            f"more than {MOST} conditions depend on the motion; only the first {MOST} end a step "
+            "where they switch", "give max_step so that none is missed",
             count, MOST, before=True,
         ))  # fmt: skip
-    return tuple(found)
+    return tuple(risks)
 
 
 def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
-    """That the fixed step of an implicit method is far too long for the motion, by the estimates
-    that adaptive steps go by.  Nothing else bounds such a step, and what it damps away leaves no
-    energy that could tell."""
+    """Risk that the fixed step of an implicit method is far too long for the motion.
+
+    The criterion is the local error estimate that controls adaptive steps.  Stability does not
+    bound such a step, and the energy shows nothing of motions that it damps.
+    """
     settings, statistics = run.settings, run.statistics
     if settings.step is None:
         return ()
@@ -56,42 +57,43 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
         span = settings.t_end - settings.t_start
         return (Risk(
             "step-accuracy", RUN,
-            f"step = {settings.step:.4g} s is longer than the run, which is one step then",
-            f"take one below {span:.4g} s", settings.step, span, "s",
+            f"step = {settings.step:.4g} s is longer than the run of {span:.4g} s, which becomes "
+            "one step", f"use a step below {span:.4g} s", settings.step, span, "s",
             before=True,
         ),)  # fmt: skip
     if error is None or len(run.t) < 3:
         return ()
     speed = float(np.sqrt(np.mean(run.u**2, axis=1)).mean()) if run.u.size else 0.0
-    way = speed * (run.t[-1] - run.t[0])
-    if not (way > 0.0 and error > _PART * way + settings.atol * statistics.steps):
+    distance = speed * (run.t[-1] - run.t[0])
+    if not (distance > 0.0 and error > _MAX_ERROR * distance + settings.atol * statistics.steps):
         return ()
-    shorter = settings.step * (_SURE * _PART * way / error) ** (1 / tableau.error_order)
+    ratio = (_TARGET * _MAX_ERROR * distance / error) ** (1 / tableau.error_order)
     return (Risk(
         "step-accuracy", RUN,
-        f"step = {settings.step:.4g} s is too long for the motion: by their own estimate its steps "
-        f"err by {error / way:.0%} of the way that is covered",
-        f"take a step below {shorter:.2g} s, or leave step out", error / way, _PART,
+        f"step = {settings.step:.4g} s is too long for the motion: estimated error of its steps "
+        f"{error / distance:.0%} of the distance travelled",
+        f"use a step below {settings.step * ratio:.2g} s, or leave step out",
+        error / distance, _MAX_ERROR,
     ),)  # fmt: skip
 
 
-def unseen(system: SceneSystem, number: int, since: float) -> Risk:
-    """That an event, or behind the events a switch, changes too fast to be followed in a step."""
+def missed_switch_note(system: SceneSystem, index: int, since: float) -> Risk:
+    """Risk that a step missed a fast event or, for an index past the events, a fast switch."""
     n = len(system.event_names)
-    what = system.event_names[number] if number < n else system.switches[number - n].what
+    where = system.event_names[index] if index < n else system.switches[index - n].what
     return Risk(
-        "switches", what,
-        f"the condition of {what} changes so fast from t = {since:.9g} s on that it may have held "
-        "between two looks at it", "write it with something wider, or give max_step",
+        "switches", where,
+        f"the condition of {where} changes so fast from t = {since:.9g} s on that it may have held "
+        "between two evaluations", "make the feature wider, or give max_step",
     )  # fmt: skip
 
 
 def chattering_note(system: SceneSystem, chatter: tuple[int, float]) -> Risk:
-    """A switch that holds the motion where it is: which one, and since when."""
-    what, since = system.switches[chatter[0]].what, chatter[1]
+    """Risk that a switch chatters, from its index and the time (s) at which it began."""
+    where, since = system.switches[chatter[0]].what, chatter[1]
     return Risk(
-        "chatter", what,
-        f"{what} switches without end from t = {since:.9g} s on, because the forces on both sides "
-        "drive the motion back to it, and no step ends there any more",
+        "chatter", where,
+        f"{where} chatters from t = {since:.9g} s on: the forces on both sides drive the motion "
+        "back to the switch, and later steps do not end there",
         "make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the hinge's law",
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A packed scene as the system that the time integration advances."""
+"""C system of a packed scene, which the integrators advance in time."""
 
 from __future__ import annotations
 
@@ -33,8 +33,11 @@ from .contact_start import check_contact_start
 
 @dataclass(frozen=True)
 class SceneCode:
-    """Code compiled for a scene: for one state, for several side by side, their numbers, where
-    inputs stand in them, and what gives the code for what implicit methods ask, if there is any."""
+    """Fused code of a scene: for one state and for SIMD lanes of states, with its numbers.
+
+    `inputs` are the indices of inputs in `numbers`.  `implicit` returns the code of residual and
+    tangent for implicit methods, None without one.
+    """
 
     one: FusedLibrary
     lanes: FusedLibrary | None
@@ -44,10 +47,10 @@ class SceneCode:
 
 
 class SceneSystem:
-    """`mstmm_system` of a model: events, power and memory of its own.
+    """`mstmm_system` of a model, with its own memory for events, power and turns.
 
-    With `compiled` the right-hand side is that code; events and settling stay with the engine.
-    Without `with_power` the work of what is not stored is not integrated.
+    With `compiled` the right-hand side is fused code, while events and projection use the engine.
+    Without `with_power` the work of non-conservative loads is not integrated.
     """
 
     def __init__(
@@ -55,25 +58,25 @@ class SceneSystem:
     ) -> None:
         packed, ffi = engine.packed, engine.ffi
         self.engine, self.kept = engine, list[Any]()
-        actions, self.event_names = _actions(engine)
+        actions, self.event_names = _event_actions(engine)
         self.switches, self.on_positions = packed.watched.switches, False
         self.memory = engine.start_memory()
         model, system = packed.model, packed.system
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
-        works = bool(system.laws or system.driven or system.loads or system.forces)
-        works = works or bool(system.couplings) or bool(packed.watched.bounces)
-        works = works or any(
+        does_work = bool(system.laws or system.driven or system.loads or system.forces)
+        does_work = does_work or bool(system.couplings) or bool(packed.watched.bounces)
+        does_work = does_work or any(
             body.D.any() or body.drag is not None for body in packed.flexible.values()
         )
-        run.with_power = int(with_power and works)
+        run.with_power = int(with_power and does_work)
         run.memory = engine.pointer(self.memory)
-        first = np.append(packed.layout.quaternions, 0).astype(np.int32)
-        run.quaternions = ffi.from_buffer("int[]", first)
+        quaternions = np.append(packed.layout.quaternions, 0).astype(np.int32)
+        run.quaternions = ffi.from_buffer("int[]", quaternions)
         run.n_quaternions = len(packed.layout.quaternions)
-        self.kept += [model, first]
+        self.kept += [model, quaternions]
         if packed.watched.tape is not None:
-            self._events(packed.watched.tape, packed.watched.ends, actions)
+            self._set_events(packed.watched.tape, packed.watched.ends, actions)
         if packed.described.controller:
             controllers = Controllers(engine)
             run.n_controllers, run.controllers = controllers.count, controllers.records
@@ -86,21 +89,20 @@ class SceneSystem:
         run.workspace = engine.pointer(self.workspace)
         self._code = compiled
         if compiled is not None:
-            self._compiled(compiled)
+            self._set_fused_code(compiled)
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
 
     def goes_by(self, compiled: SceneCode | None) -> bool:
-        """Whether the right-hand side is this code, or none where none is given."""
+        """True if the right-hand side is this fused code, or the looped engine for None."""
         code = self._code
         if code is None or compiled is None:
             return code is compiled
-        same = code.one is compiled.one and code.lanes is compiled.lanes
-        return same and code.numbers is compiled.numbers
+        same_library = code.one is compiled.one and code.lanes is compiled.lanes
+        return same_library and code.numbers is compiled.numbers
 
     def offer_tangent(self) -> None:
-        """Make what implicit methods ask for: residual and tangent, by code compiled for them where
-        it is given."""
+        """Provide residual and tangent for implicit methods, by fused code where it exists."""
         engine, run = self.engine, self.run
         if self.system.implicit:
             return
@@ -108,35 +110,36 @@ class SceneSystem:
         base = TangentMatrix(engine, self.memory)
         stage, size = engine.ffi.new("mstmm_tangent *", base.record[0]), engine.nq + 2 * engine.nu
         work = np.zeros(engine.lib.mstmm_residual_work(engine.packed.model))
-        known, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
+        base_state, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
         stage.workspace, stage.work = run.workspace, engine.pointer(work)
-        run.base, run.stage, run.known = base.record, stage, engine.pointer(known)
+        run.base, run.stage, run.known = base.record, stage, engine.pointer(base_state)
         run.steady = int(engine.packed.system.steady)
         run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
         engine.lib.mstmm_scene_implicit(run, self.system)
-        self.kept += [base, stage, work, known, coordinates]
+        self.kept += [base, stage, work, base_state, coordinates]
         if self._code is not None and (implicit := self._code.implicit()) is not None:
-            self._implicit_by(implicit, self._code.numbers)
+            self._set_implicit_code(implicit, self._code.numbers)
 
     def ask_positions(self) -> None:
-        """From now on steps of implicit methods, which have been offered a tangent, ask rows of
-        closed loops for positions where they end, and nothing of speeds; but for steps that are cut
-        short."""
+        """Make implicit steps satisfy closed loops at position level instead of speed level.
+
+        Call after `offer_tangent`.  Steps that are cut short keep to the speed level.
+        """
         self.on_positions = True
         self.engine.lib.mstmm_scene_on_positions(self.run)
 
-    def _implicit_by(self, code: FusedLibrary, given: Array) -> None:
+    def _set_implicit_code(self, code: FusedLibrary, start_numbers: Array) -> None:
         engine, lib = self.engine, self.engine.lib
-        numbers = np.array(given)  # where inputs are written as time goes on
+        numbers = np.array(start_numbers)  # own copy: C writes the inputs into it during the run
         scratch = np.zeros(lib.mstmm_implicit_code_size(code.descriptor))
         pointers = engine.pointer(numbers), engine.pointer(scratch)
         lib.mstmm_implicit_by_code(self.run, code.descriptor, *pointers)
         self.kept += [numbers, scratch, *pointers]
 
-    def _compiled(self, code: SceneCode) -> None:
+    def _set_fused_code(self, code: SceneCode) -> None:
         engine, lib = self.engine, self.engine.lib
         lanes = engine.ffi.NULL if code.lanes is None else code.lanes.descriptor
-        numbers = np.array(code.numbers)  # where inputs are written as time goes on
+        numbers = np.array(code.numbers)  # own copy: C writes the inputs into it during the run
         live = LiveInputs(engine.packed.system, code.inputs)
         if live.varies:
             self.run.live.n, self.run.live.inputs = len(live.places), engine.packed.model.inputs
@@ -147,9 +150,10 @@ class SceneSystem:
         lib.mstmm_scene_compiled(self.run, code.one.descriptor, lanes, *pointers)
         self.kept += [code, numbers, scratch, *pointers]
 
-    def _events(
+    def _set_events(
         self, tape: Tape, ends: Sequence[tuple[str, str]], actions: list[tuple[int, int]]
     ) -> None:
+        """Write tape, probes and actions of events; `actions` are pairs (action, memory index)."""
         engine, ffi, run = self.engine, self.engine.ffi, self.run
         resize_workspace(engine.packed, tape.slots)
         run.event_tape = c_tape(ffi, tape, self.kept)
@@ -163,41 +167,45 @@ class SceneSystem:
         run.read, run.n_read = ffi.from_buffer("int[]", read), len(read) - 1
         run.bounds = bounds
         if _reads_velocities(tape):
-            later = np.zeros(engine.nq + engine.nu + 1)
-            run.later = engine.pointer(later)
-            self.kept.append(later)
+            later_state = np.zeros(engine.nq + engine.nu + 1)
+            run.later = engine.pointer(later_state)
+            self.kept.append(later_state)
         run.probe_values = engine.pointer(numbers)
         table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
         for record, (action, release) in zip(table, actions, strict=False):
             record.action, record.release = action, release
         for bounce in engine.packed.watched.bounces:
-            self._bounce(table[bounce.event], bounce)
+            self._set_bounce(table[bounce.event], bounce)
         run.events, run.n_events = table, len(actions)
-        run.closes = int(engine.packed.system.closes and _read_states(engine.packed.scene))
+        run.closes = int(engine.packed.system.closes and _reads_state(engine.packed.scene))
         run.n_switches = min(len(self.switches), MOST)
         self.kept += [records, numbers, table, bounds, read]
 
-    def _bounce(self, record: Any, bounce: Bounce) -> None:
+    def _set_bounce(self, record: Any, bounce: Bounce) -> None:
         engine, ffi = self.engine, self.engine.ffi
         resize_workspace(engine.packed, bounce.slopes.slots)
-        places = np.array([bounce.places], dtype=np.int32).reshape(-1)
+        indices = np.array([bounce.places], dtype=np.int32).reshape(-1)
         numbers = np.zeros(1 + len(bounce.places) + 4 * engine.nu)
         record.slopes = c_tape(ffi, bounce.slopes, self.kept)
-        record.n_slopes, record.places = len(bounce.places), ffi.from_buffer("int[]", places)
+        record.n_slopes, record.places = len(bounce.places), ffi.from_buffer("int[]", indices)
         record.restitution, record.numbers = bounce.restitution, engine.pointer(numbers)
-        self.kept += [places, numbers]
+        self.kept += [indices, numbers]
 
     @property
     def with_power(self) -> bool:
-        """True if the state ends with the work of everything that is not stored."""
+        """True if the last state component is the work of non-conservative loads."""
         return bool(self.run.with_power)
 
     def begin(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
-        """`start` of a run between hard stops: controllers that act at t have done so."""
+        """State vector at the start of a run, like `start`, after controllers have acted at t.
+
+        Raises SceneError for a start on or past a contact, NumericalFailure where a controller
+        cannot be evaluated.
+        """
         y, packed = self.start(t, q, u), self.engine.packed
         if packed.system.strained >= 0:
-            near = self.run.strain > packed.model.loops_strain
-            self.memory[packed.system.strained] = near
+            is_nearly_singular = self.run.strain > packed.model.loops_strain
+            self.memory[packed.system.strained] = is_nearly_singular
         lib = self.engine.lib
         if lib.mstmm_controllers_act(self.run, t, self.engine.pointer(y)) > 0:
             raise NumericalFailure(self.engine.failure_text(self.run.failure, t))
@@ -205,8 +213,10 @@ class SceneSystem:
         return y
 
     def watched(self, t: float, y: Array) -> Array | None:
-        """Values of the events, >= 0 where they hold, and behind them the margins of switches;
-        None where they cannot be evaluated."""
+        """Values of events (>= 0 where they hold), followed by the margins of switches.
+
+        None where they cannot be evaluated.
+        """
         calls, pointer = self.system, self.engine.pointer
         values = np.empty(calls.n_events + calls.n_switches)
         state = np.ascontiguousarray(y)
@@ -216,19 +226,21 @@ class SceneSystem:
         return None if failed else values
 
     def meeting(self, event: int, t: float, y: Array, u: Array) -> Any:
-        """`mstmm_meeting`: how the value of an event that bounces changes at a state with speeds u
-        (nu,).  Raises NumericalFailure where that cannot be evaluated."""
-        engine, found = self.engine, self.engine.ffi.new("mstmm_meeting *")
+        """Rate of change of the value of a bounce event, as `mstmm_meeting`, at speeds u (nu,).
+
+        Raises NumericalFailure where it cannot be evaluated.
+        """
+        engine, record = self.engine, self.engine.ffi.new("mstmm_meeting *")
         state, speeds = (engine.pointer(np.ascontiguousarray(x)) for x in (y, u))
-        if engine.lib.mstmm_meeting_of(self.run, event, t, state, speeds, found):
+        if engine.lib.mstmm_meeting_of(self.run, event, t, state, speeds, record):
             raise NumericalFailure(engine.failure_text(self.run.failure, t))
-        return found
+        return record
 
     def start(self, t: float, q: ArrayLike, u: ArrayLike) -> Array:
-        """State vector at t with driven coordinates, quaternions, loops and memory in order.
+        """State vector at t, projected onto drives, unit quaternions and closed loops.
 
-        Hinges that have let go by then go on from what is given, as free ones.  Raises SceneError
-        where a loop does not close near the state.
+        Hinges released before t start free from the given q and u.  Raises SceneError where a loop
+        does not close near the state.
         """
         y = np.concatenate(
             [np.asarray(q, float), np.asarray(u, float), np.zeros(int(self.with_power))]
@@ -237,8 +249,8 @@ class SceneSystem:
         packed, run = self.engine.packed, self.run
         for name in hinges_released_by_time(packed.scene, t) if packed.releases else ():
             self.memory[packed.releases[name]] = 1.0
-        run.failure.reason = 0  # of another state that did not close
-        run.on_positions = 0  # no start slips, whatever the steps of this system's last run left
+        run.failure.reason = 0  # may be set by an earlier state
+        run.on_positions = 0  # a start satisfies the loops at speed level with every method
         self.engine.lib.mstmm_scene_settle(run, t, self.engine.pointer(y))
         run.on_positions = self.on_positions
         if run.failure.reason in (FailureCode.LOOP, FailureCode.COUPLING, FailureCode.FLAT):
@@ -246,18 +258,18 @@ class SceneSystem:
         return y
 
     def components(self) -> StateNames:
-        """A name per component of the state."""
+        """Names of the state components."""
         return StateNames(self.engine.packed.layout, self.with_power)
 
 
 def _components_read(tape: Tape) -> list[int]:
-    """Which components of q and u, in that order, an event tape reads."""
+    """Indices of the components of q and u, in that order, that an event tape reads."""
     time, n_q, n_u, *_ = tape.input_lengths
     return sorted(slot - time for slot in _slots_read(tape) if time <= slot < time + n_q + n_u)
 
 
 def _reads_velocities(tape: Tape) -> bool:
-    """Whether an event tape reads velocities of ends."""
+    """True if an event tape reads velocities of ends."""
     first = sum(tape.input_lengths[:3])
     points = range(first, first + tape.input_lengths[3])
     return any(slot in points and (slot - first) % 6 >= 3 for slot in _slots_read(tape))
@@ -269,25 +281,25 @@ def _slots_read(tape: Tape) -> set[int]:
     return {slot for row in rows for slot in row[2:]} | set(tape.outputs[2::OUTPUT_WIDTH])
 
 
-def _read_states(scene: Scene) -> bool:
-    """Whether events or releases go by more than time."""
-    conditions = [one.when for one in scene.events]
-    conditions += [one.release for one in scene.hinge if one.release is not None]
-    return any(name.text != "t" for one in conditions for name in one.names)
+def _reads_state(scene: Scene) -> bool:
+    """True if events or releases depend on more than time."""
+    conditions = [event.when for event in scene.events]
+    conditions += [hinge.release for hinge in scene.hinge if hinge.release is not None]
+    return any(name.text != "t" for condition in conditions for name in condition.names)
 
 
-def _actions(engine: LoopedEngine) -> tuple[list[tuple[int, int]], list[str]]:
-    """(action, memory place) and name of every event and release."""
+def _event_actions(engine: LoopedEngine) -> tuple[list[tuple[int, int]], list[str]]:
+    """Pairs (action, memory index), and names, of all events and releases."""
     packed, lib = engine.packed, engine.lib
     actions: list[tuple[int, int]] = []
     names: list[str] = []
-    bounces = len(packed.releases)
+    bounce_index = len(packed.releases)
     for number, event in enumerate(packed.scene.events):
         action = lib.MSTMM_FIRE_STOP if event.do == "stop" else lib.MSTMM_FIRE_RESTART
-        place = packed.releases[str(event.hinge)] if event.do == "release" else -1
+        memory_index = packed.releases[str(event.hinge)] if event.do == "release" else -1
         if event.do == "bounce":
-            place, bounces = bounces, bounces + 1
-        actions.append((action, place))
+            memory_index, bounce_index = bounce_index, bounce_index + 1
+        actions.append((action, memory_index))
         names.append(packed.scene.happening(number))
     for hinge in packed.scene.hinge:
         if hinge.release is not None:

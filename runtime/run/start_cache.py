@@ -1,4 +1,4 @@
-"""Where several runs of one scene begin: what they share is made for the first of them."""
+"""Cache of integrators that successive runs of one scene reuse."""
 
 from __future__ import annotations
 
@@ -12,22 +12,29 @@ from ..engine.compiled_scene import CompiledScene
 from ..engine.looped_engine import LoopedEngine
 from ..integrate.c_loop import Integrator
 from ..integrate.settings import Settings
-from .integration_run import asks_positions, energy_at, initial_method, make_run, tolerances
+from .integration_run import (
+    energy_at,
+    initial_method,
+    make_run,
+    tolerances,
+    uses_position_constraints,
+)
 from .scene_system import SceneCode, SceneSystem
 
-#: Runs of more components are long enough for all to be made anew.
-_MOST = 200
+#: Largest number of state components; runs of more take so long that reuse saves nothing.
+_MAX_STATES = 200
 
 
 class StartCache:
-    """Runs of one engine over the same times with the same samples, one after the other: the
-    integrator of one stands at the start of the next, while the code is the same.
+    """System and integrator for successive runs of one engine over the same times.
+
+    They are reused while the fused code and the constraint level of the method are the same.
     """
 
     def __init__(self) -> None:
-        self._made: tuple[SceneSystem, Integrator] | None = None
-        #: Time (s), state and energy (J) of a start.
-        self._known: tuple[float, Array, float] | None = None
+        self._cached: tuple[SceneSystem, Integrator] | None = None
+        #: Time (s), state and energy (J) of the last start.
+        self._start_energy: tuple[float, Array, float] | None = None
 
     def begin(
         self,
@@ -37,13 +44,13 @@ class StartCache:
         q: Array,
         u: Array,
     ) -> tuple[SceneSystem, Integrator]:
-        """The system and the integrator at the start of a run from (nq,), (nu,)."""
-        if self._made is None or not self._serves(self._made[0], compiled, settings):
+        """System and integrator at the start of a run from (nq,), (nu,)."""
+        if self._cached is None or not self._is_reusable(self._cached[0], compiled, settings):
             system = SceneSystem(engine, compiled)
             run = make_run(system, settings, q, u, energy=self._energy_at)
-            self._made = system, run
+            self._cached = system, run
             return system, run
-        system, run = self._made
+        system, run = self._cached
         tableau = initial_method(system, settings)
         system.memory[:] = engine.start_memory()
         start = system.begin(settings.t_start, q, u)
@@ -51,32 +58,35 @@ class StartCache:
         return system, run
 
     @staticmethod
-    def _serves(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
-        return system.goes_by(compiled) and system.on_positions == asks_positions(settings)
+    def _is_reusable(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
+        same_level = system.on_positions == uses_position_constraints(settings)
+        return system.goes_by(compiled) and same_level
 
     def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
-        """That of the start, J, looked at once for runs from the same."""
-        known = self._known
-        if known is None or known[0] != t or not np.array_equal(known[1], start):
-            known = self._known = t, start.copy(), energy_at(system, t, start)
-        return known[2]
+        """Energy of the start in J, computed once for runs from the same start."""
+        cached = self._start_energy
+        if cached is None or cached[0] != t or not np.array_equal(cached[1], start):
+            cached = self._start_energy = t, start.copy(), energy_at(system, t, start)
+        return cached[2]
 
 
-#: The integrator of a model's last run, and over which times with which samples.
-_waiting: WeakKeyDictionary[CompiledScene, tuple[object, StartCache]] = WeakKeyDictionary()
+#: Start cache of a model's last run, with the times for which it is valid.
+_last_caches: WeakKeyDictionary[CompiledScene, tuple[object, StartCache]] = WeakKeyDictionary()
 
 
 def take_start_cache(model: CompiledScene, settings: Settings) -> StartCache:
-    """Beginnings of a run: of the model's last one where that was over the same times with the same
-    samples.  Of several threads one gets it."""
-    times, found = _waiting.pop(model, (None, None))
-    return StartCache() if found is None or times != _times(settings) else found
+    """Take the start cache of the model's last run if its times are the same, else a new one.
+
+    Taking removes it, so that only one of several threads uses it.
+    """
+    times, cache = _last_caches.pop(model, (None, None))
+    return StartCache() if cache is None or times != _times(settings) else cache
 
 
 def return_start_cache(model: CompiledScene, settings: Settings, beginnings: StartCache) -> None:
-    """Keep those of a run that has ended for the next one."""
-    if model.nq + model.nu <= _MOST:
-        _waiting[model] = _times(settings), beginnings
+    """Return the start cache of a finished run, for the model's next run."""
+    if model.nq + model.nu <= _MAX_STATES:
+        _last_caches[model] = _times(settings), beginnings
 
 
 def _times(settings: Settings) -> object:

@@ -1,5 +1,4 @@
-"""The state in which a compiled scene begins: as its hinges say it, drives and static shapes taken
-in."""
+"""Initial state of a compiled scene, with drives, closed loops and static deformations."""
 
 from __future__ import annotations
 
@@ -8,27 +7,27 @@ from mstmm.array_validation import Array
 from ..engine.compiled_scene import CompiledScene
 from ..packing.initial_state import start_values
 from .scene_system import SceneSystem
-from .static_start.static_deformation import settle, settle_among_loops
+from .static_start.static_deformation import static_deformation, static_deformation_with_loops
 
 
 def initial_state(compiled: CompiledScene) -> tuple[Array, Array]:
-    """(q, u) at t = 0.  Raises NumericalFailure where a static shape is not found."""
+    """Initial state (q, u) at t = 0; NumericalFailure where a static deformation is not found."""
     packed, engine = compiled.packed, compiled.looped
     q, u = start_values(packed.scene, compiled.layout, packed.flexible)
     if compiled.closed is None:
         y = SceneSystem(engine).start(0.0, q, u)
         q, u = y[: compiled.nq], y[compiled.nq : compiled.nq + compiled.nu]
     else:
-        q, u = (one.copy() for one in compiled.closed.start)
-    described = (*packed.described.beam, *packed.described.elastic)
-    still = [b.name for b in described if b.name in packed.flexible and b.initial.static]
-    if not still:
+        q, u = (x.copy() for x in compiled.closed.start)
+    tables = (*packed.described.beam, *packed.described.elastic)
+    static_names = [b.name for b in tables if b.name in packed.flexible and b.initial.static]
+    if not static_names:
         return q, u
-    bodies = {name: compiled.flexible[name] for name in still}
+    bodies = {name: compiled.flexible[name] for name in static_names}
     if compiled.freedom is not None:
-        return settle_among_loops(compiled, compiled.freedom, q, u, bodies)
+        return static_deformation_with_loops(compiled, compiled.freedom, q, u, bodies)
     memory = engine.start_memory()
-    q = settle(
+    q = static_deformation(
         lambda q, u, udot: engine.inverse_dynamics(0.0, q, u, udot, memory),
         q, u, bodies, compiled.layout.modal,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Why a run ended, in words: the expression, the element or the speed that is behind it."""
+"""Messages on the end of a run, naming the expression, element or speed that caused it."""
 
 from __future__ import annotations
 
@@ -26,119 +26,122 @@ if TYPE_CHECKING:
     from .scene_system import SceneSystem
 
 
-#: What a run ends with where call-backs of the scene fail; their code says how.
-_EVALUATIONS = (
+#: Statuses of failed callbacks of the scene, whose failure record gives the cause.
+_CALLBACK_FAILURES = (
     Status.RHS_FAILED, Status.EVENT_FAILED, Status.TANGENT_FAILED, Status.ACCEPT_FAILED,
     Status.FIRE_FAILED,
 )  # fmt: skip
 
 
-#: What a run may end with where an expression stops being a number.
-_BY_EXPRESSIONS = (
+#: Statuses that a non-finite expression may cause.
+_NONFINITE_FAILURES = (
     Status.NOT_FINITE, Status.STEP_TOO_SMALL, Status.RHS_FAILED, Status.TANGENT_FAILED,
     Status.NOT_CONVERGED,
 )  # fmt: skip
-#: What a run may end with at a switch, and how many steps before or after the last good state
-#: the motion passes it at most.
-_AT_SWITCHES = (Status.TOO_MANY_STEPS, Status.STEP_TOO_SMALL, Status.NOT_CONVERGED)
-_PASSING = 2.0
+#: Statuses that a switch may cause, and the largest distance of the switch from the last good
+#: state, in steps.
+_SWITCH_FAILURES = (Status.TOO_MANY_STEPS, Status.STEP_TOO_SMALL, Status.NOT_CONVERGED)
+_SWITCH_DISTANCE = 2.0
 
-#: States looked at past the last good one lie this many times farther ahead each, up to this part
-#: of the time: a run ends within rounding of the place where an expression stops being a number.
-_FARTHER, _FARTHEST = 4.0, 1e-9
+#: Search for a non-finite expression past the last good state: growth of the time ahead from trial
+#: to trial, and its largest value relative to t.  A run ends within rounding of such a point.
+_AHEAD_FACTOR, _MAX_AHEAD = 4.0, 1e-9
 
 
-def message_of(system: SceneSystem, run: Integrator) -> str:
-    """How a run ended or stands, as a sentence."""
+def stop_message(system: SceneSystem, run: Integrator) -> str:
+    """Sentence on how a run ended, or on its present state."""
     if run.status is Status.FINISHED:
         return run.message()
     failure = run.failure
     cause = ""
     if failure is not None:
-        end = end_of_curve(system, run.t, run.y, failure.time)
-        if end:
-            return f"{end}; last good state at t = {run.t:.9g} s"
+        curve_end = curve_end_message(system, run.t, run.y, failure.time)
+        if curve_end:
+            return f"{curve_end}; last good state at t = {run.t:.9g} s"
         implicit = run.tableau.implicit
-        cause = cause_of(system, failure.status, run.t, run.y, failure.time, implicit)
-    if failure is not None and failure.code and failure.status in _EVALUATIONS:
+        cause = expression_cause(system, failure.status, run.t, run.y, failure.time, implicit)
+    if failure is not None and failure.code and failure.status in _CALLBACK_FAILURES:
         text = cause or system.engine.failure_text(system.run.failure, failure.time)
         return f"{text}; last good state at t = {run.t:.9g} s"
     message = run.message(system.components(), system.event_names, cause)
-    message += rest_of(system, run.event) if run.status is Status.STOPPED else ""
-    if failure is not None and failure.status in _AT_SWITCHES and run.chatter is not None:
+    message += rest_note(system, run.event) if run.status is Status.STOPPED else ""
+    if failure is not None and failure.status in _SWITCH_FAILURES and run.chatter is not None:
         return f"{message}; {chattering_note(system, run.chatter)}"
-    work = failure is not None and failure.component == system.engine.nq + system.engine.nu
-    message += fastest_speed(system, run.t, run.y) if work else ""
-    small = failure is not None and failure.status is Status.STEP_TOO_SMALL
-    message += _indefinite(system, run.y) if small else ""
-    return message if cause else message + _switch_at(system, run)
+    work_failed = failure is not None and failure.component == system.engine.nq + system.engine.nu
+    message += fastest_speed(system, run.t, run.y) if work_failed else ""
+    step_too_small = failure is not None and failure.status is Status.STEP_TOO_SMALL
+    message += _indefinite_mass_note(system, run.y) if step_too_small else ""
+    return message if cause else message + _switch_note(system, run)
 
 
-def rest_of(system: SceneSystem, event: int) -> str:
-    """What ends the message of a run that an event stopped: words for bounces, which stop it where
-    they follow ever faster."""
-    if all(one.event != event for one in system.engine.packed.watched.bounces):
+def rest_note(system: SceneSystem, event: int) -> str:
+    """Ending of the message of a run that accumulating bounces of an event stopped, else ""."""
+    if all(bounce.event != event for bounce in system.engine.packed.watched.bounces):
         return ""
     return (
-        ": its bounces follow ever faster, what bounces has come to rest there; what lies still "
-        "needs a stop that carries it (law.limits with a stiffness)"
+        ": its bounces accumulate and have come to rest on the contact; to continue the run at "
+        "rest, use a stop with a stiffness (law.limits) instead of a restitution"
     )
 
 
-def cause_of(
+def expression_cause(
     system: SceneSystem, status: Status, t: float, y: Array, failed_at: float, implicit: bool
 ) -> str:
-    """The expression that stopped a run whose last good state is (t, y); empty if none did.
-    Implicit methods are stopped by slopes as well."""
-    found = end_of_curve(system, t, y, failed_at)
-    if found or status not in _BY_EXPRESSIONS:
-        return found
+    """Expression or curve end that stopped a run with last good state (t, y); "" if none did.
+
+    Implicit methods also fail at derivatives that are not finite.
+    """
+    cause = curve_end_message(system, t, y, failed_at)
+    if cause or status not in _NONFINITE_FAILURES:
+        return cause
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
-    found = _culprit_ahead(engine, t, q, u, system.memory, failed_at)
-    return found or (find_nonfinite_derivative(engine, t, q, u) if implicit else "")
+    cause = _nonfinite_expression_ahead(engine, t, q, u, system.memory, failed_at)
+    return cause or (find_nonfinite_derivative(engine, t, q, u) if implicit else "")
 
 
-def end_of_curve(system: SceneSystem, t: float, y: Array, failed_at: float) -> str:
-    """The curve whose end stopped a run whose last good state is (t, y); empty if none did."""
+def curve_end_message(system: SceneSystem, t: float, y: Array, failed_at: float) -> str:
+    """Message on the curve whose end stopped a run with last good state (t, y); "" if none did."""
     engine = system.engine
     q, u = y[: engine.nq], y[engine.nq : engine.nq + engine.nu]
     return describe_curve_end(engine, t, q, u, 2 * max(failed_at - t, 4 * math.ulp(t)))
 
 
-def _culprit_ahead(
+def _nonfinite_expression_ahead(
     engine: LoopedEngine, t: float, q: Array, u: Array, memory: Array, failed_at: float
 ) -> str:
-    """The same at the last good state of a run, or where its rates lead from there; `failed_at` is
-    the time of the trial that failed."""
-    found = find_nonfinite_expression(engine, t, q, u)
-    if found:
-        return found
+    """Non-finite expression at the last good state or at an extrapolation of it; "" if none.
+
+    `failed_at` is the time (s) of the failed trial step.
+    """
+    cause = find_nonfinite_expression(engine, t, q, u)
+    if cause:
+        return cause
     try:
         qdot, udot = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None].copy())
     except NumericalFailure:
         return ""
     ahead = max(failed_at - t, 4 * math.ulp(t))
-    farthest = max(2 * ahead, _FARTHEST * max(1.0, abs(t)))
-    while ahead <= farthest and not found:
-        found = find_nonfinite_expression(
+    max_ahead = max(2 * ahead, _MAX_AHEAD * max(1.0, abs(t)))
+    while ahead <= max_ahead and not cause:
+        cause = find_nonfinite_expression(
             engine, t + ahead, q + ahead * qdot[0], u + ahead * udot[0]
         )
-        ahead *= _FARTHER
-    return found
+        ahead *= _AHEAD_FACTOR
+    return cause
 
 
-def _indefinite(system: SceneSystem, y: Array) -> str:
-    """Which mass matrices were lost, in words: the reason of many a step that is too small."""
+def _indefinite_mass_note(system: SceneSystem, y: Array) -> str:
+    """Note on flexible bodies whose mass matrix is indefinite, a cause of too small steps."""
     packed = system.engine.packed
     if not packed.flexible:
         return ""
-    lost = _indefinite_bodies(packed, y[: system.engine.nq])
-    names = ", ".join(f'"{name}"' for name in lost[:3]) + (", ..." if len(lost) > 3 else "")
+    bodies = _indefinite_bodies(packed, y[: system.engine.nq])
+    names = ", ".join(f'"{name}"' for name in bodies[:3]) + (", ..." if len(bodies) > 3 else "")
     return (
         f"; the mass matrix of flexible body {names} is not positive definite at its deflection: "
         'leave frame = "auto" and quadrature = "auto", or split the body'
-        if lost
+        if bodies
         else ""
     )
 
@@ -157,21 +160,20 @@ def _indefinite_bodies(packed: PackedScene, q: Array) -> list[str]:
 
 
 def fastest_speed(system: SceneSystem, t: float, y: Array) -> str:
-    """Which speed changes fastest at a state, for messages that name no hinge by themselves."""
+    """Note on the speed with the largest acceleration, for messages that name no hinge."""
     engine = system.engine
     q, u = y[: engine.nq][None].copy(), y[engine.nq : engine.nq + engine.nu][None].copy()
-    seen = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
-    rates = np.nan_to_num(np.abs(seen.udot[0]), nan=0.0, posinf=np.inf)
+    observed = engine.observe(np.array([t]), q, u, system.memory[None].copy(), parts=("udot",))
+    rates = np.nan_to_num(np.abs(observed.udot[0]), nan=0.0, posinf=np.inf)
     if not rates.any():
         return ""
     return f"; the fastest change is that of {engine.packed.layout.u_name(int(rates.argmax()))}"
 
 
-def _switch_at(system: SceneSystem, run: Integrator) -> str:
-    """The switch that the motion passes within a step or two of where the run failed, as words that
-    end a message; empty where none does."""
+def _switch_note(system: SceneSystem, run: Integrator) -> str:
+    """Note on a switch within a step or two of the failure of a run; "" if there is none."""
     failure = run.failure
-    if failure is None or failure.status not in _AT_SWITCHES or not system.system.n_switches:
+    if failure is None or failure.status not in _SWITCH_FAILURES or not system.system.n_switches:
         return ""
     engine, t, y = system.engine, run.t, run.y
     n_q, n = engine.nq, engine.nq + engine.nu
@@ -180,20 +182,21 @@ def _switch_at(system: SceneSystem, run: Integrator) -> str:
         qdot, udot = engine.accelerations(t, q, u, system.memory[None].copy())
     except NumericalFailure:
         return ""
-    reach = _PASSING * max(failure.time - t, run.last_step, 4 * math.ulp(t))
+    distance = _SWITCH_DISTANCE * max(failure.time - t, run.last_step, 4 * math.ulp(t))
     rates = np.zeros(len(y))
     rates[:n] = np.concatenate([qdot[0], udot[0]])
-    before, after = (_margins(system, t + s, y + s * rates) for s in (-reach, reach))
-    passed = np.flatnonzero(~(before * after > 0))
-    if not len(passed):
+    before, after = (_switch_margins(system, t + s, y + s * rates) for s in (-distance, distance))
+    crossed = np.flatnonzero(~(before * after > 0))
+    if not len(crossed):
         return ""
     return (
-        f"; {system.switches[int(passed[0])].what} switches there: if the motion sticks to it, "
-        "make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the hinge's law"
+        f"; {system.switches[int(crossed[0])].what} switches there: if the motion stays at the "
+        "switch, make it smooth, such as tanh(u/0.001) for sign(u), or use the friction of the "
+        "hinge's law"
     )
 
 
-def _margins(system: SceneSystem, t: float, y: Array) -> Array:
-    """Of all switches that are watched: each is zero where it switches."""
+def _switch_margins(system: SceneSystem, t: float, y: Array) -> Array:
+    """Margins (n_switches,) of the switches, zero where they switch; ones if not evaluable."""
     values = system.watched(t, y)
     return np.ones(system.system.n_switches) if values is None else values[system.system.n_events :]

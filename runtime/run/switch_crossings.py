@@ -1,42 +1,42 @@
-"""Crossings of switches, and whether an end is in sight, in a run that is driven from Python; the C
-loop keeps its own."""
+"""Switch crossings and progress of runs that Python steps; the C loop has its own code."""
 
 from __future__ import annotations
 
 import numpy as np
 
-#: Crossings in a row in hardly any time, as part of the run, after which a switch is left alone.
-_MOST, _AT_ONCE = 50, 2.0**-42
+#: Consecutive crossings after which a chattering switch is ignored, and the longest time between
+#: them, relative to the run.
+_MAX_CROSSINGS, _CHATTER_TIME = 50, 2.0**-42
 
-#: Steps between looks at how the run gets on, and steps that have no end in sight.
-_SOME, _NO_END = 1024, 1e10
+#: Steps between checks of progress, and expected remaining steps at which a run is given up.
+_CHECK_INTERVAL, _MAX_REMAINING_STEPS = 1024, 1e10
 
-#: A step that a switch cuts ends behind this part of the way to it.
-_JUST_BEFORE = 1.0 - 2.0**-10
+#: Part of the time to a switch that a step shortened for it covers.
+_SHORTENED = 1.0 - 2.0**-10
 
 
-def just_before(start: float, switch: float) -> float:
-    """Where a step from `start` is to end, just before a switch."""
-    return start + _JUST_BEFORE * (switch - start)
+def shortened_step_end(start: float, switch: float) -> float:
+    """End time (s) of a step from `start` that must end shortly before a switch."""
+    return start + _SHORTENED * (switch - start)
 
 
 class ProgressCheck:
-    """Whether a run from `start` to `end` (s) gets on fast enough to end at all."""
+    """Check that a run from `start` to `end` (s) advances fast enough to end at all."""
 
     def __init__(self, start: float, end: float) -> None:
-        self.end, self._since, self._attempts = end, start, 0
+        self.end, self._last_time, self._attempts = end, start, 0
 
     def has_end(self, t: float) -> bool:
-        """To be asked at every step, made again or not."""
+        """True if the run can reach its end; call at every attempted step."""
         self._attempts += 1
-        if self._attempts % _SOME:
+        if self._attempts % _CHECK_INTERVAL:
             return True
-        gone, self._since = t - self._since, t
-        return (self.end - t) * _SOME <= _NO_END * gone
+        advance, self._last_time = t - self._last_time, t
+        return (self.end - t) * _CHECK_INTERVAL <= _MAX_REMAINING_STEPS * advance
 
 
 class Crossings:
-    """Which of `n` switches are `watched` (n,) in a run of `span` s, and how often they crossed."""
+    """Crossings of `n` switches in a run of `span` s; `watched` (n,) excludes chattering ones."""
 
     def __init__(self, n: int, span: float) -> None:
         self.n, self.span, self.count, self.here = n, span, 0, 0
@@ -45,15 +45,15 @@ class Crossings:
         self.watched = np.ones(n, dtype=bool)
 
     def is_short(self, time: float) -> bool:
-        """Is that hardly any time in this run?"""
-        return time <= _AT_ONCE * self.span
+        """True if a time in s is negligible in this run."""
+        return time <= _CHATTER_TIME * self.span
 
     def note(self, switch: int, t: float) -> None:
-        """One has crossed at t; one that does so without end is no longer watched."""
-        at_once = self.is_short(t - self._last[switch])
+        """Record a crossing at t; stop watching a switch that chatters."""
+        is_repeated = self.is_short(t - self._last[switch])
         self._last[switch] = t
         self.count += 1
-        self.here = self.here + 1 if at_once else 0
-        if self.here >= _MOST:
+        self.here = self.here + 1 if is_repeated else 0
+        if self.here >= _MAX_CROSSINGS:
             self.here, self.chatter = 0, (switch, t)
             self.watched[switch] = False

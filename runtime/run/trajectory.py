@@ -1,4 +1,4 @@
-"""The states of a run over its samples."""
+"""States of a run at its samples."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from .method_segments import MethodSegment
 class Trajectory:
     """States of a run: t (n,), q (n, nq), u (n, nu), memory (n, m), work (n,) in J, event (n,).
 
-    q and u hold unit quaternions and exact driven coordinates; `norm_residual` is how far the
-    quaternions' lengths were from 1 before.  `last` is (t, q, u) of the last good state and `start`
-    (q, u) at the beginning, which output times may leave out.
+    q and u hold unit quaternions and exact driven coordinates; `norm_residual` is the largest
+    deviation of a quaternion's length from 1 before normalisation.  `last` is (t, q, u) of the last
+    good state and `start` is (q, u) at t_start; output times may omit both.
     """
 
     t: Array
@@ -42,29 +42,28 @@ class Trajectory:
     norm_residual: float = 0.0
     last: tuple[float, Array, Array] | None = None
     start: tuple[Array, Array] | None = None
-    risks: Iterable[Risk] = ()  # seen before the run and by it, which samples do not tell
-    methods: tuple[MethodSegment, ...] = ()  # of a run that chose among them
-    reached: AchievedError | None = None  # of a run that was asked for an error
-    told: bool = True  # whether its risks are wanted among its warnings
-    before: float = 0.0  # s of wall time that earlier processes spent on it, which no file keeps
+    risks: Iterable[Risk] = ()  # found before and during the run, not from its samples
+    methods: tuple[MethodSegment, ...] = ()  # of method "auto"
+    reached: AchievedError | None = None  # of a run with a target error
+    told: bool = True  # whether its risks appear among its warnings
+    before: float = 0.0  # wall time in s of earlier processes; result files do not store it
 
     @property
     def first(self) -> tuple[float, Array, Array]:
-        """(t, q, u) of the beginning; of the first sample where an older file knows no other."""
+        """(t, q, u) at the start; of the first sample in an old file without the start."""
         if self.start is not None:
             return (self.settings.t_start, *self.start)
         if not len(self.t):
-            raise SceneError("the file of this result does not tell how its run began")
+            raise SceneError("result file: expected the initial state or a sample, found neither")
         return float(self.t[0]), self.q[0], self.u[0]
 
     @property
     def success(self) -> bool:
-        """True if the run reached its end or an event was asked to stop it, with finite numbers."""
+        """True if the run reached t_end or a stop event, with finite numbers."""
         return self.is_comparable and self.status is not Status.CAME_TO_REST
 
     @property
     def is_comparable(self) -> bool:
-        """True if the run has finite numbers up to where it is defined: to its end, to an event
-        that was asked to stop it, or to where bounces came to rest."""
-        done = self.status in (Status.FINISHED, Status.STOPPED, Status.CAME_TO_REST)
-        return done and bool(np.isfinite(self.q).all() and np.isfinite(self.u).all())
+        """True if the numbers are finite up to t_end, a stop event, or the rest of a bounce."""
+        is_complete = self.status in (Status.FINISHED, Status.STOPPED, Status.CAME_TO_REST)
+        return is_complete and bool(np.isfinite(self.q).all() and np.isfinite(self.u).all())

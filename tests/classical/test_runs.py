@@ -98,7 +98,7 @@ def test_options_are_for_this_method_alone() -> None:
 
 def test_a_batch_is_refused() -> None:
     model = mstmm.compile(rods(1))
-    with pytest.raises(SceneError, match="makes one run at a time: use simulate"):
+    with pytest.raises(SceneError, match="cannot run batches; use simulate"):
         model.simulate_batch(([[0.0]], [[0.0]]), t_end=0.1, method=RICCATI, step=0.01)
 
 
@@ -125,7 +125,7 @@ def test_nothing_to_do_is_the_start_alone() -> None:
         ({"step": 0.01, "scheme": "hht:x"}, "expected alpha from 0 to 0.333333"),
         ({"step": 0.01, "scheme": "newmark:0.4"}, "expected gamma from 0.5 to 1"),
         ({"step": 0.01, "iterations": 0}, "a whole number of iterations, 1 or more"),
-        ({"step": 0.01, "checkpoint": "x"}, "keeps no checkpoints"),
+        ({"step": 0.01, "checkpoint": "x"}, "writes no checkpoints"),
     ],
 )
 def test_settings_that_make_no_sense_are_refused(keys: dict[str, Any], said: str) -> None:

@@ -130,7 +130,7 @@ def test_a_motion_that_sticks_ends_by_name(mstmm: Command, folder: Path) -> None
     done = mstmm("simulate", "sticky.toml", "--times", "5", "-o", "run.csv")
     assert done.code == 4
     assert "no end in sight" in done.err
-    assert "'sign(u)' (effort of hinge \"pivot\") switches without end" in done.err
+    assert "'sign(u)' (effort of hinge \"pivot\") chatters" in done.err
 
 
 def test_default_result_is_netcdf_beside_us(mstmm: Command, folder: Path) -> None:

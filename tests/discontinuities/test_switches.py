@@ -111,7 +111,7 @@ def test_a_motion_that_sticks_ends_with_a_reason(method: str) -> None:
     result = moved("-10*sign(u) + 3*sin(t)", 10.0, u=0.3, method=method, output_times=[0.0, 10.0])
     assert result.status is Status.TOO_MANY_STEPS and not result.success
     assert "no end in sight" in result.message
-    assert "'sign(u)' (effort of hinge \"h\") switches without end" in result.message
+    assert "'sign(u)' (effort of hinge \"h\") chatters" in result.message
     assert result.trajectory.last is not None
     assert result.trajectory.last[0] == pytest.approx(0.0300, abs=2e-3)
 
@@ -119,7 +119,7 @@ def test_a_motion_that_sticks_ends_with_a_reason(method: str) -> None:
 def test_a_limit_of_steps_is_the_only_one() -> None:
     result = moved("-10*sign(u)", 10.0, u=0.3, max_steps=9000)
     assert result.status is Status.TOO_MANY_STEPS and "more steps than allowed" in result.message
-    assert any("switches without end" in text for text in result.warnings)
+    assert any("chatters" in text for text in result.warnings)
 
 
 def test_switches_passed_in_turn_are_all_met() -> None:
@@ -165,7 +165,7 @@ def test_a_run_is_cut_anywhere_bit_for_bit() -> None:
 def test_scipys_methods_end_where_a_motion_sticks() -> None:
     result = moved("-10*sign(u)", 10.0, u=0.3, method="scipy-RK45", output_times=[0.0, 10.0])
     assert result.status is Status.TOO_MANY_STEPS
-    assert "'sign(u)' (effort of hinge \"h\") switches without end" in result.message
+    assert "'sign(u)' (effort of hinge \"h\") chatters" in result.message
 
 
 def test_many_conditions_are_watched_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -191,10 +191,11 @@ def test_implicit_methods_name_what_a_motion_sticks_to(
 ) -> None:
     result = moved(effort, 5.0, u=0.3, method=method, step=step, max_steps=5000)
     assert result.status in (Status.TOO_MANY_STEPS, Status.NOT_CONVERGED), result.message
-    assert "'sign(u)' (effort of hinge \"h\") switches" in result.message
+    words = ("switches there", "chatters from")
+    assert any(f"'sign(u)' (effort of hinge \"h\") {x}" in result.message for x in words)
     assert result.message.count("make it smooth") == 1
 
 
 def test_a_switch_far_from_the_end_is_not_blamed() -> None:
     result = moved("-1e-3*sign(u) - q", 50.0, u=1.0, method="kvaerno5", max_steps=20)
-    assert result.status is Status.TOO_MANY_STEPS and "switches" not in result.message
+    assert result.status is Status.TOO_MANY_STEPS and "sign(u)" not in result.message

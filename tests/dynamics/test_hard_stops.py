@@ -111,8 +111,8 @@ def test_nothing_gives_way() -> None:
         ({"upper": 1.0, "restitution": 0.5, "stiffness": 1e4}, {}, "give one"),
         ({"restitution": 0.5}, {}, "lower, upper or both"),
         ({"upper": 1.0}, {}, "a stiffness above 0 .* or a restitution"),
-        ({"upper": 1.0, "restitution": 0.5}, {"q": 1.2}, "begins beyond it"),
-        ({"upper": 1.0, "restitution": 0.5}, {"q": 1.0}, "begins on it"),
+        ({"upper": 1.0, "restitution": 0.5}, {"q": 1.2}, "past the stop"),
+        ({"upper": 1.0, "restitution": 0.5}, {"q": 1.0}, "at rest on the stop"),
     ],
 )
 def test_refused(limits: Scene, start: Scene, said: str) -> None:

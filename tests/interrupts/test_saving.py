@@ -61,7 +61,7 @@ def test_a_result_that_cannot_be_saved(
     with (folder / "a.csv.checkpoint").open("wb") as kept:
         np.savez(kept, **(data | {"seconds": np.array(5000.0)}))
     with monkeypatch.context() as patch:
-        patch.setattr(run_execution, "_advanced", fail)  # nothing is computed again
+        patch.setattr(run_execution, "_advance_and_save", fail)  # nothing is computed again
         again = mstmm(*RUN, "--resume", "--json")
     assert again.code == 0 and json.loads(again.out)["seconds"] > 5000
     assert (folder / "a.csv").read_bytes() == whole

@@ -239,11 +239,14 @@ def test_it_is_written_and_saved_with_the_scene() -> None:
     ("changes", "message"),
     [
         ({"outputs": ["pull"]}, r'outputs\[0\]: there is no input "pull"'),
-        ({"inputs": ["place", "block.orientation.w"]}, 'block.orientation.w": this cannot be'),
+        (
+            {"inputs": ["place", "block.orientation.w"]},
+            'block.orientation.w": this quantity cannot be',
+        ),
         ({"inputs": ["place", "blok.x"]}, 'controller "regulator": inputs: "blok.x"'),
         ({"inputs": ["plase", "quick"]}, '"plase": .*; did you mean "place"'),
         ({"inputs": ["place", "slide.displacment"]}, 'did you mean "slide.displacement"'),
-        ({"inputs": ["place", "tip"]}, '"block.tip.position": this cannot be looked at'),
+        ({"inputs": ["place", "tip"]}, '"block.tip.position": this quantity cannot be measured'),
         ({"B": ((1.0,), (1.0,))}, "B: expected 2 rows of 2"),
         ({"A": ((1.0, 2.0), (3.0,))}, "rows of"),
         ({"C": ()}, "C: missing; expected 1 rows of 2"),

@@ -58,12 +58,12 @@ def test_every_run_is_as_a_first_one(engine: str, monkeypatch: pytest.MonkeyPatc
     asked = [(q, each) for q in STARTS for each in how]
     model = mstmm.compile(scene(), engine=engine)
     later = [run(model, q, **each) for q, each in asked]
-    assert model in start_cache._waiting
-    monkeypatch.setattr(start_cache, "_MOST", 0)
+    assert model in start_cache._last_caches
+    monkeypatch.setattr(start_cache, "_MAX_STATES", 0)
     for (q, each), found in zip(asked, later, strict=True):
         first = mstmm.compile(scene(), engine=engine)
         assert same(run(first, q, **each), found)
-        assert first not in start_cache._waiting
+        assert first not in start_cache._last_caches
 
 
 def test_among_closed_loops(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -72,7 +72,7 @@ def test_among_closed_loops(monkeypatch: pytest.MonkeyPatch) -> None:
     how = ("dop853", "genalpha-index3", "genalpha", "genalpha-index3", "rk4")
     model = mstmm.compile(four_bar, engine="looped")
     later = [model.simulate(0.2, one, step=2e-3, output_times=[0.2]) for one in how]
-    monkeypatch.setattr(start_cache, "_MOST", 0)
+    monkeypatch.setattr(start_cache, "_MAX_STATES", 0)
     for one, found in zip(how, later, strict=True):
         first = mstmm.compile(four_bar, engine="looped")
         assert same(first.simulate(0.2, one, step=2e-3, output_times=[0.2]), found), one

@@ -237,9 +237,9 @@ def test_bodies_that_answer_to_whole_runs_are_refused() -> None:
             "D": [[1.0]]}  # fmt: skip
     tables: Any = {"gravity": (0, -9.81, 0), "beam": [beam], "hinge": [hinge],
                    "input": [{"name": "push"}]}  # fmt: skip
-    with pytest.raises(SceneError, match='"arm": a session sees nothing of the deflection'):
+    with pytest.raises(SceneError, match='"arm": a session cannot use a body'):
         mstmm.compile(mstmm.Scene(**tables)).session()
-    with pytest.raises(SceneError, match='"arm": controller "gain" sees nothing'):
+    with pytest.raises(SceneError, match='"arm": controller "gain" cannot use'):
         mstmm.compile(mstmm.Scene(**tables, controller=[gain]))
 
 

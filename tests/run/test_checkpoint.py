@@ -132,7 +132,7 @@ def test_a_checkpoint_of_another_run_is_refused(
         other.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
     for change in ({"step": 0.02}, {"t_end": 6.0}, {"method": "dop853", "step": None}):
         settings = {"t_end": 5.0, "step": 0.01, "method": "rk4"} | change
-        with pytest.raises(mstmm.SceneError, match="the settings or the start have changed"):
+        with pytest.raises(mstmm.SceneError, match="settings or the initial state have changed"):
             model.simulate(checkpoint=path, resume=True, **settings)  # type: ignore[arg-type]
     with np.load(path) as file:
         assert all(file[name].dtype.kind in "fiU" for name in file.files)  # no pickle
@@ -152,7 +152,7 @@ def test_a_file_that_is_no_checkpoint(tmp_path: Path, content: bytes) -> None:
     with pytest.raises(mstmm.SceneError, match=r"run\.npz"):
         mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
     np.savez(path, x=1)
-    with pytest.raises(mstmm.SceneError, match="not one of this version"):
+    with pytest.raises(mstmm.SceneError, match="not written by this version"):
         mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
 
 
@@ -220,7 +220,7 @@ def test_a_checkpoint_that_was_cut_or_overwritten(tmp_path: Path, share: float) 
 
 
 def test_a_folder_that_is_not_there_is_noticed_before_the_run(tmp_path: Path) -> None:
-    with pytest.raises(mstmm.EnvironmentFailure, match="its folder cannot be written"):
+    with pytest.raises(mstmm.EnvironmentFailure, match="folder does not exist or is not writable"):
         mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=tmp_path / "no" / "run.npz")
 
 

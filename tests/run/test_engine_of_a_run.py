@@ -100,6 +100,6 @@ def test_an_interrupted_run_on_compiled_code_continues_bit_for_bit(
     cut = fused.simulate(progress=interrupt, **settings)
     assert calls
     assert cut.status is None
-    with pytest.raises(EnvironmentFailure, match="began on compiled code, which cannot be had"):
+    with pytest.raises(EnvironmentFailure, match="began on fused code, which cannot be compiled"):
         model("looped").simulate(resume=True, **settings)
     assert equal(fused.simulate(resume=True, **settings), whole)

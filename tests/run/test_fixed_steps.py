@@ -31,7 +31,7 @@ def test_a_step_that_misses_the_motion_is_named_with_one_that_does_not(method: s
     step = 0.15 if get(method).order == 2 else 0.1
     (text,) = told(swung(step, method))
     assert text.startswith(f"step = {step} s is too long for the motion")
-    found = re.search(r"err by (\d+)% of the way .* take a step below ([\d.]+) s", text)
+    found = re.search(r"steps (\d+)% of the distance .* use a step below ([\d.]+) s", text)
     assert found is not None
     assert int(found[1]) >= 2
     shorter = float(found[2])

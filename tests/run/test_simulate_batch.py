@@ -168,7 +168,7 @@ def test_what_makes_no_sense_is_refused(pins: Model) -> None:
     q, u = states(pins, 3)
     for initial, more, message in (
         ((q[:, :1], u), {}, r"q has shape \(3, 1\)"),
-        ((np.stack([q, q]), np.stack([u, u])), {}, "2 leading axes"),
+        ((np.stack([q, q]), np.stack([u, u])), {}, "one leading axis, .* found 2"),
         ((q, u), {"t_end": 0.0}, "t_end"),
         ((q, u), {"output_times": [0.5, 0.2]}, "increasing"),
         ((q, u), {"output_times": [0.5, 2.0]}, "between"),

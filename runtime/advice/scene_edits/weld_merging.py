@@ -20,7 +20,13 @@ from mstmm.scene.validators.scalars_and_vectors import GROUND
 from ...chart.model_levels import with_tables
 from ...packing.flexible.rigid_substitution import substitute_rigid_bodies
 from ...packing.merging.referenced_parts import ReferencedParts, referenced_parts
-from ...packing.merging.weld_geometry import end_at, end_of, orientation_of, together, weld_pose
+from ...packing.merging.weld_geometry import (
+    end_pose,
+    merged_body,
+    to_end,
+    to_orientation,
+    weld_pose,
+)
 from ..body_model_levels import RIGID
 from ..measure_renaming import compose_names, rename_reference
 from .chain_expansion import ExpandedScene, expand_chains, expandable_chains
@@ -202,7 +208,7 @@ def _remove_weld(
     if removed != weld.outboard_body:
         pose = pose.inverse
     poses = {removed: pose} | {
-        f"{removed}.{end}": pose.then(end_of(part, end)) for end in part.ends
+        f"{removed}.{end}": pose.then(end_pose(part, end)) for end in part.ends
     }
     scene = with_tables(
         merged.scene, hinge=tuple(hinge for hinge in merged.scene.hinge if hinge.name != weld.name)
@@ -220,8 +226,8 @@ def _merge_into_body(
     ends, names = dict(whole.ends), {}
     for old, pose in poses.items():
         end = _unused_name(ends, old.replace(".", "_"))
-        ends[end], names[old] = end_at(pose), f"{whole.name}.{end}"
-    body = together(whole, part, poses[part.name]).model_copy(update={"ends": ends})
+        ends[end], names[old] = to_end(pose), f"{whole.name}.{end}"
+    body = merged_body(whole, part, poses[part.name]).model_copy(update={"ends": ends})
     renamed = with_references(scene, names)
     bodies = tuple(
         body if other.name == whole.name else other
@@ -302,7 +308,7 @@ def _attached_to_ground(element: Any, rotation: Matrix, poses: Mapping[str, Pose
     return element.model_copy(
         update={
             "inboard": GROUND, "position": pose.position,
-            "orientation": orientation_of(pose.then(Pose(ZERO, rotation))),
+            "orientation": to_orientation(pose.then(Pose(ZERO, rotation))),
         }
     )  # fmt: skip
 

@@ -265,8 +265,8 @@ def _equivalent_rigid_body(body: Beam | Elastic, modal: ModalBody | None) -> Bod
             )
         return rigid_body_of_beam(body)
     if modal is not None:
-        turning = np.trace(modal.second) * np.eye(3) - modal.second
-        return _rigid_body(body.name, modal.mass, modal.first, turning, modal.ports)
+        inertia = np.trace(modal.second) * np.eye(3) - modal.second
+        return _rigid_body(body.name, modal.mass, modal.first, inertia, modal.ports)
     j, ports = rigid_inertia_and_ends(body)
     first = np.array([j[5, 1], j[3, 2], j[4, 0]])
     return _rigid_body(body.name, float(j[0, 0]), first, j[3:, 3:], ports)

@@ -1,4 +1,4 @@
-"""What inputs are in each trajectory of a batch: a number, or a signal with values of its own."""
+"""Inputs of the trajectories of a batch: constants or signals, common or per trajectory."""
 
 from __future__ import annotations
 
@@ -21,105 +21,104 @@ from ...engine.input_values import InputValue
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
 
-#: As in `simulate`, or a number for each trajectory, or values (n, m) over times (m,).
+#: As in `simulate`, or numbers (n,), one per trajectory, or values (n, m) over times (m,).
 BatchInput = InputValue | ArrayLike
 
 
 @dataclass(frozen=True)
 class BatchInputs:
-    """Inputs over time by their names, one row of them for each trajectory."""
+    """Inputs over time: per trajectory, input name -> piecewise polynomial."""
 
     rows: list[dict[str, PiecewisePolynomial]]
 
     def model(self, model: CompiledScene, k: int) -> CompiledScene:
-        """The model under the inputs of a trajectory."""
+        """Model with the inputs of trajectory k."""
         return (
             model.renewed(with_input_pieces(model.packed, self.rows[k])) if self.rows[k] else model
         )
 
     def timed(self, model: CompiledScene) -> CompiledScene:
-        """The model with the times of those that go by time, and its own numbers for the others:
-        where steps end, they end in all trajectories."""
-        varying = {name: one for name, one in self.rows[0].items() if one.varies}
+        """Model with the time-dependent inputs, whose breaks end steps in all trajectories."""
+        varying = {name: signal for name, signal in self.rows[0].items() if signal.varies}
         return model.renewed(with_input_pieces(model.packed, varying)) if varying else model
 
     def moves_breaks(self, model: CompiledScene) -> bool:
-        """Whether numbers that differ decide when an expression of time switches or is fast."""
-        names = {name for name, one in self.rows[0].items() if not one.varies}
-        for one in active_expressions(model.scene):
-            if names & set(one.inputs):
-                known = dict(one.constants)
-                unknown = {name: x for name, x in known.items() if name not in names}
-                if _looked_at(one, known) != _looked_at(one, unknown):
+        """True if constant inputs determine when an expression of time switches or is narrow."""
+        names = {name for name, signal in self.rows[0].items() if not signal.varies}
+        for active in active_expressions(model.scene):
+            if names & set(active.inputs):
+                constants = dict(active.constants)
+                other_constants = {name: x for name, x in constants.items() if name not in names}
+                if _feature_count(active, constants) != _feature_count(active, other_constants):
                     return True
         return False
 
 
-def _looked_at(one: Any, constants: dict[str, float]) -> int:
-    view = ExpressionFunctions(one.expression, constants, one.drive)
-    return len(view.margins()) + len(view.watched())
+def _feature_count(active: Any, constants: dict[str, float]) -> int:
+    """Number of switches and narrow features of an active expression of time."""
+    functions = ExpressionFunctions(active.expression, constants, active.drive)
+    return len(functions.margins()) + len(functions.watched())
 
 
 def batch_inputs(
     model: CompiledScene, inputs: Mapping[str, BatchInput] | None, n: int
 ) -> BatchInputs:
-    """The inputs of n trajectories.
+    """Inputs of n trajectories.
 
-    Raises SceneError for names of no input, for values that no input can have or that are not as
-    many, and for inputs that drive.
+    Raises SceneError for unknown inputs, invalid values or array sizes, and for inputs that
+    prescribe a motion.
     """
     given = {} if inputs is None else mapping_by_name("inputs", inputs)
-    _refuse_drives(model, given)
-    columns = [(name, *_columns(name, value, n)) for name, value in given.items()]
+    _reject_drives(model, given)
+    columns = [(name, *_column(name, value, n)) for name, value in given.items()]
     checked = model.with_inputs({name: first for name, first, _ in columns}) if n else model
     rows: list[dict[str, PiecewisePolynomial]] = [{} for _ in range(n)]
-    for name, first, each in columns:
-        one = checked.scene.channels[name]
+    for name, first, values in columns:
+        common = checked.scene.channels[name]
         for k, row in enumerate(rows):
-            if each is None:
-                row[name] = one
+            if values is None:
+                row[name] = common
             elif isinstance(first, Mapping):
                 kind = first.get("interpolation", "line")
-                row[name] = interpolate(first["times"], each[k].tolist(), kind)
+                row[name] = interpolate(first["times"], values[k].tolist(), kind)
             else:
-                row[name] = constant(float(each[k]))
+                row[name] = constant(float(values[k]))
     return BatchInputs(rows)
 
 
-def rows_of(name: str, value: Any) -> int:
-    """For how many trajectories a number or an input is given; 1 where it serves all."""
+def row_count(name: str, value: Any) -> int:
+    """Number of trajectories that a parameter or an input is given for; 1 for a common value."""
     if isinstance(value, str):
         return 1
-    over_time, of_each = isinstance(value, Mapping) or _is_pair(value), value
-    if over_time:
-        of_each = value.get("values", 0.0) if isinstance(value, Mapping) else value[1]
-    found = finite_array(name, of_each)
-    return len(found) if found.ndim == 1 + over_time else 1
+    is_signal, values = isinstance(value, Mapping) or _is_pair(value), value
+    if is_signal:
+        values = value.get("values", 0.0) if isinstance(value, Mapping) else value[1]
+    array = finite_array(name, values)
+    return len(array) if array.ndim == 1 + is_signal else 1
 
 
-def _refuse_drives(model: CompiledScene, given: Mapping[str, Any]) -> None:
-    for one in active_expressions(model.scene):
-        driving = [name for name in one.inputs if one.drive and name in given]
-        if driving:
+def _reject_drives(model: CompiledScene, given: Mapping[str, Any]) -> None:
+    for active in active_expressions(model.scene):
+        names = [name for name in active.inputs if active.drive and name in given]
+        if names:
             raise SceneError(
-                f'inputs["{driving[0]}"]: the {one.what} follows this input, which a batch takes '
-                f'as a parameter: parameters={{"{driving[0]}.value": ...}}'
+                f'inputs["{names[0]}"]: the {active.what} follows this input, expected an input '
+                f'that prescribes no motion; use parameters={{"{names[0]}.value": ...}}'
             )
 
 
-def _columns(name: str, value: Any, n: int) -> tuple[InputValue, Array | None]:
-    """What the first trajectory is given, and the values (n,) or (n, m) of each; None where one
-    serves all."""
-    at = f'inputs["{name}"]'
+def _column(name: str, value: Any, n: int) -> tuple[InputValue, Array | None]:
+    """Input of the first trajectory, and values (n,) or (n, m) of all; None for a common input."""
+    where = f'inputs["{name}"]'
     if isinstance(value, str):
         return value, None
     if isinstance(value, Mapping):
-        return _over_time(at, dict(value), n) if "values" in value else (value, None)
+        return _signal_column(where, dict(value), n) if "values" in value else (value, None)
     if _is_pair(value):
-        return _over_time(at, {"times": value[0], "values": value[1]}, n)
-    column = finite_array(at, value)
+        return _signal_column(where, {"times": value[0], "values": value[1]}, n)
+    column = finite_array(where, value)
     if column.shape not in ((), (n,)):
-        raise SceneError(f"{at} has shape {column.shape}, expected ({n},)")
+        raise SceneError(f"{where} has shape {column.shape}, expected ({n},)")
     return float(column.flat[0]) if column.size else 0.0, np.broadcast_to(column, (n,))
 
 
@@ -129,13 +128,14 @@ def _is_pair(value: Any) -> bool:
     )  # fmt: skip
 
 
-def _over_time(at: str, keys: dict[str, Any], n: int) -> tuple[InputValue, Array | None]:
-    values = finite_array(f"{at} values", keys["values"])
+def _signal_column(where: str, keys: dict[str, Any], n: int) -> tuple[InputValue, Array | None]:
+    values = finite_array(f"{where} values", keys["values"])
     if values.ndim < 2:
         return keys | {"values": values}, None
     if values.ndim > 2 or len(values) != n:
         raise SceneError(
-            f"{at} values have shape {values.shape}, expected (m,), or ({n}, m) with a row for each"
+            f"{where} values have shape {values.shape}, expected (m,) for all trajectories or "
+            f"({n}, m) with a row per trajectory"
         )
-    times = finite_array(f"{at} times", keys.get("times", ())).tolist()
+    times = finite_array(f"{where} times", keys.get("times", ())).tolist()
     return keys | {"times": times, "values": values[0]}, values

@@ -1,10 +1,10 @@
-"""Many independent runs of a model: side by side in the lanes of vectors, and on several threads.
+"""Batches: independent runs of a model in SIMD lanes and on several threads.
 
-Where the scene has compiled code and neither events, releases, memory nor drives, every
-thread advances as many trajectories at a time as a vector has lanes, each with its own error
-control.  Other scenes run one trajectory after the other on every thread.  Which way is taken
-depends on the scene and the machine alone, so that the numbers of a trajectory depend neither on
-the size of the batch, nor on its neighbours, nor on the number of threads.
+Where the scene has fused code and neither events, releases, memory nor drives, each thread advances
+as many trajectories at a time as a vector has lanes, each with its own error control.  Other scenes
+run one trajectory after the other on each thread.  The choice depends only on the scene and the
+machine, so that the numbers of a trajectory do not depend on the size of the batch, on the other
+trajectories or on the number of threads.
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ from ...packing.switch_margins import has_switches
 from .. import classical_run, external_integrators
 from ..integration_run import (
     advance,
-    choice_of,
     make_run,
+    method_choice,
     project_samples,
     status_message,
     trajectory,
 )
 from ..method_segments import MethodSegment
 from ..scene_system import SceneCode, SceneSystem
-from .batch_inputs import BatchInput, BatchInputs, batch_inputs, rows_of
-from .interruptible_threads import on_threads
+from .batch_inputs import BatchInput, BatchInputs, batch_inputs, row_count
+from .interruptible_threads import run_on_threads
 from .simd_lanes import LaneInputs, Lanes, run_lanes
 
 if TYPE_CHECKING:
@@ -57,19 +57,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BatchModels:
-    """The model of each run, with its own numbers and inputs."""
+    """Models of the runs, with their parameters and inputs."""
 
     models: tuple[CompiledScene, ...]
     given: BatchInputs
 
     def of(self, k: int) -> CompiledScene:
-        """That of run k."""
+        """Model of run k."""
         return self.given.model(self.models[k], k)
 
 
 @dataclass(frozen=True)
 class BatchData:
-    """What n runs gave.
+    """Result of n runs.
 
     Attributes:
         t: (m,) output times in s.
@@ -78,12 +78,11 @@ class BatchData:
         success: (n,) True where a run reached its end, or an event stopped it.
         messages: n sentences; for a failure cause, time and element.
         evaluations: (n,) calls of the right-hand side.
-        engine: how it was computed, in words.
-        methods: n times what each run did, where runs choose among methods ("auto"); empty for
-            those of one method.
+        engine: description of the computation.
+        methods: for each run the segments of method "auto", else empty.
         memory: (n, m, memory) of events, turns and controllers.
-        settings: how all runs were made.
-        models: the model of each.
+        settings: of all runs.
+        models: models of the runs.
     """
 
     t: Array
@@ -104,8 +103,8 @@ class BatchData:
 
 
 @dataclass
-class _Rows:
-    """The arrays of a batch, filled by whoever runs a trajectory."""
+class _BatchArrays:
+    """Arrays of a batch, to which each thread writes the rows of its trajectories."""
 
     samples: Array  # (n, m, nq + nu)
     success: NDArray[np.bool_]
@@ -125,51 +124,52 @@ def simulate_batch(
     threads: int | None,
 ) -> BatchData:
     """See `Model.simulate_batch`; settings hold the output times."""
-    if len(q) == 1:  # one start serves as many as there are numbers
+    if len(q) == 1:  # a single initial state serves all parameters and inputs
         given = {} if inputs is None else mapping_by_name("inputs", inputs)
         given |= mapping_by_name("parameters", parameters)
-        many = max([1, *(rows_of(name, value) for name, value in given.items())])
-        q, u = np.repeat(q, many, axis=0), np.repeat(u, many, axis=0)
+        n = max([1, *(row_count(name, value) for name, value in given.items())])
+        q, u = np.repeat(q, n, axis=0), np.repeat(u, n, axis=0)
     n, times = len(q), np.asarray(settings.output_times)
-    alone_only = settings.method == AUTO or get(settings.method).implicit
-    made, by_row = _models(model, parameters, n), batch_inputs(model, inputs, n)
-    models = [model if isinstance(one, MstmmError) else one for one in made]
-    failed = np.array([isinstance(one, MstmmError) for one in made], bool)
-    alone_only = alone_only or (n > 0 and by_row.moves_breaks(model))
-    library = None if alone_only else _lanes(model)
+    made, given_inputs = _models_or_errors(model, parameters, n), batch_inputs(model, inputs, n)
+    models = [model if isinstance(m, MstmmError) else m for m in made]
+    failed = np.array([isinstance(m, MstmmError) for m in made], bool)
+    is_sequential = settings.method == AUTO or get(settings.method).implicit
+    is_sequential = is_sequential or (n > 0 and given_inputs.moves_breaks(model))
+    library = None if is_sequential else _lane_library(model)
     count = min(thread_count(threads) or os.cpu_count() or 1, max(1, n))
-    rows = _Rows(
+    arrays = _BatchArrays(
         np.full((n, len(times), model.nq + model.nu), np.nan), np.zeros(n, dtype=bool),
-        [str(one) if isinstance(one, MstmmError) else "" for one in made],
+        [str(m) if isinstance(m, MstmmError) else "" for m in made],
         np.zeros(n, dtype=np.int64), [()] * n,
         np.full((n, len(times), model.packed.system.n_memory), np.nan),
     )  # fmt: skip
-    alike = _of_equal_times(model, models, settings)
-    closing = model.packed.system.closes  # by numbers that all share
-    ours = np.array([library is not None and alike[id(m)] and m.fusion.lanes is library
-                     and (m is model or not closing) for m in models], bool) & ~failed  # fmt: skip
-    if library is not None and ours.any():
-        which = np.flatnonzero(ours)
-        _side_by_side(model, library, models, by_row, settings, q, u, which, rows, count)
-    alone = np.flatnonzero(~(ours | failed))
-    if len(alone):
-        _one_by_one(models, by_row, settings, q, u, alone, rows, count)
-    how = "one after the other" if library is None else f"{library.lanes} side by side"
+    same_times = _has_same_times(model, models, settings)
+    closes = model.packed.system.closes  # loops are closed with the parameters of `model`
+    in_lanes = np.array([library is not None and same_times[id(m)] and m.fusion.lanes is library
+                         and (m is model or not closes) for m in models], bool)  # fmt: skip
+    in_lanes &= ~failed
+    if library is not None and in_lanes.any():
+        rows = np.flatnonzero(in_lanes)
+        _run_in_lanes(model, library, models, given_inputs, settings, q, u, rows, arrays, count)
+    rows = np.flatnonzero(~(in_lanes | failed))
+    if len(rows):
+        _run_sequentially(models, given_inputs, settings, q, u, rows, arrays, count)
+    order = "one after the other" if library is None else f"{library.lanes} side by side"
     nq = model.nq
     return BatchData(
-        times, rows.samples[..., :nq].copy(), rows.samples[..., nq:].copy(), rows.success,
-        tuple(rows.messages), rows.evaluations, f"{how} on {count} threads",
-        tuple(rows.methods), rows.memory, settings, BatchModels(tuple(models), by_row),
+        times, arrays.samples[..., :nq].copy(), arrays.samples[..., nq:].copy(), arrays.success,
+        tuple(arrays.messages), arrays.evaluations, f"{order} on {count} threads",
+        tuple(arrays.methods), arrays.memory, settings, BatchModels(tuple(models), given_inputs),
     )  # fmt: skip
 
 
-def _models(
+def _models_or_errors(
     model: CompiledScene, parameters: Mapping[str, ArrayLike], n: int
 ) -> list[CompiledScene | MstmmError]:
-    """The model of each trajectory, or why there is none, as where its loops stay open; equal
-    numbers share one.
+    """Model of each trajectory, or the error that prevents it, such as loops that stay open.
 
-    Raises SceneError for a name or a value that the scene refuses, naming the trajectory.
+    Equal parameters share a model.  Raises SceneError for a name or a value that the scene rejects,
+    with the number of the trajectory.
     """
     if not parameters:
         return [model] * n
@@ -179,46 +179,50 @@ def _models(
         if column.shape not in ((), (n,)):
             raise SceneError(f'parameter "{name}" has shape {column.shape}, expected ({n},)')
         columns[name] = np.broadcast_to(column, (n,))
-    made: dict[tuple[float, ...], CompiledScene | MstmmError] = {}
-    found = []
+    by_parameters: dict[tuple[float, ...], CompiledScene | MstmmError] = {}
+    models = []
     for i in range(n):
         row = tuple(float(column[i]) for column in columns.values())
-        if row not in made:
-            made[row] = _made(model, dict(zip(columns, row, strict=True)), i)
-        found.append(made[row])
-    return found
+        if row not in by_parameters:
+            by_parameters[row] = _model_or_error(model, dict(zip(columns, row, strict=True)), i)
+        models.append(by_parameters[row])
+    return models
 
 
-def _made(model: CompiledScene, numbers: dict[str, float], i: int) -> CompiledScene | MstmmError:
+def _model_or_error(
+    model: CompiledScene, values: dict[str, float], i: int
+) -> CompiledScene | MstmmError:
     try:
-        return model.with_parameters(numbers)
+        return model.with_parameters(values)
     except MstmmError as error:
         try:
-            with_parameters(model.scene, numbers)
-        except SceneError as refused:
-            raise SceneError(f"trajectory {i}: {refused}") from None
+            with_parameters(model.scene, values)
+        except SceneError as scene_error:
+            raise SceneError(f"trajectory {i}: {scene_error}") from None
         return error
 
 
-def _of_equal_times(
+def _has_same_times(
     model: CompiledScene, models: list[CompiledScene], settings: Settings
 ) -> dict[int, bool]:
-    """By the id of each model: do its expressions switch at the times of those of `model`?  Where
-    not, the steps of one trajectory would have to end where another's do not."""
+    """Id of each model -> True if its expressions switch at the same times as those of `model`.
 
-    def times(one: CompiledScene) -> list[list[float]]:
-        known = one.packed.time_map(settings.t_start, settings.t_end)
-        return [known.breaks.tolist(), known.starts.tolist(), known.longest.tolist()]
+    The steps of all lanes end at the same breaks.
+    """
+
+    def times(m: CompiledScene) -> list[list[float]]:
+        time_map = m.packed.time_map(settings.t_start, settings.t_end)
+        return [time_map.breaks.tolist(), time_map.starts.tolist(), time_map.longest.tolist()]
 
     expressions = active_expressions(model.scene)
     return {
-        id(one): active_expressions(one.scene) == expressions or times(one) == times(model)
-        for one in {id(one): one for one in models}.values()
+        key: active_expressions(m.scene) == expressions or times(m) == times(model)
+        for key, m in {id(m): m for m in models}.items()
     }
 
 
-def _lanes(model: CompiledScene) -> FusedLibrary | None:
-    """Code for several states side by side, where trajectories can be run on it."""
+def _lane_library(model: CompiledScene) -> FusedLibrary | None:
+    """Fused code for SIMD lanes; None for scenes whose trajectories cannot run in lanes."""
     packed = model.packed
     if has_switches(packed.scene):
         return None
@@ -227,35 +231,36 @@ def _lanes(model: CompiledScene) -> FusedLibrary | None:
     return model.fusion.ready_lanes(math.inf)
 
 
-def _side_by_side(
-    model: CompiledScene, library: FusedLibrary, models: list[CompiledScene], given: BatchInputs,
-    settings: Settings, q: Array, u: Array, which: NDArray[np.int64], rows: _Rows, threads: int,
+def _run_in_lanes(
+    model: CompiledScene, library: FusedLibrary, models: list[CompiledScene],
+    given_inputs: BatchInputs, settings: Settings, q: Array, u: Array, rows: NDArray[np.int64],
+    arrays: _BatchArrays, threads: int,
 ) -> None:  # fmt: skip
-    engine = given.timed(model).looped
-    code = _scalar(model, settings) if model.packed.system.closes else None
+    engine = given_inputs.timed(model).looped
+    code = _sequential_code(model, settings) if model.packed.system.closes else None
     systems = [SceneSystem(engine, code, with_power=False) for _ in range(threads)]
-    start = np.ascontiguousarray(np.concatenate([q[which], u[which]], axis=1))
-    begun = np.full(len(start), settings.t_start)
-    start, _ = project_samples(systems[0], begun, start, np.zeros((len(start), 1)))
-    numbers = np.ascontiguousarray([models[i].fusion.numbers for i in which])
-    channels = [list((models[i].packed.channels | given.rows[i]).values()) for i in which]
-    live = LaneInputs(engine, model.fusion.inputs, channels, numbers)
-    lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu, live)
+    start = np.ascontiguousarray(np.concatenate([q[rows], u[rows]], axis=1))
+    start_times = np.full(len(start), settings.t_start)
+    start, _ = project_samples(systems[0], start_times, start, np.zeros((len(start), 1)))
+    numbers = np.ascontiguousarray([models[i].fusion.numbers for i in rows])
+    channels = [list((models[i].packed.channels | given_inputs.rows[i]).values()) for i in rows]
+    lane_inputs = LaneInputs(engine, model.fusion.inputs, channels, numbers)
+    lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu, lane_inputs)
     samples, outcomes = run_lanes(lanes, start)
-    for place, (i, outcome) in enumerate(zip(which, outcomes, strict=True)):
-        rows.samples[i] = samples[place]
+    for i, trajectory_samples, outcome in zip(rows, samples, outcomes, strict=True):
+        arrays.samples[i] = trajectory_samples
         status = Status(outcome.status)
-        rows.evaluations[i] = outcome.evaluations
-        rows.success[i] = status is Status.FINISHED
+        arrays.evaluations[i] = outcome.evaluations
+        arrays.success[i] = status is Status.FINISHED
         span = settings.t_start, settings.t_end
-        rows.messages[i] = _lanes_message(models[i], library, systems[0], outcome, span)
-    flat = rows.samples[which].reshape(-1, model.nq + model.nu)
-    times = np.tile(np.asarray(settings.output_times), len(which))
+        arrays.messages[i] = _lane_message(models[i], library, systems[0], outcome, span)
+    flat = arrays.samples[rows].reshape(-1, model.nq + model.nu)
+    times = np.tile(np.asarray(settings.output_times), len(rows))
     flat, _ = project_samples(systems[0], times, flat, np.zeros((len(flat), 1)))
-    rows.samples[which] = flat.reshape(len(which), -1, model.nq + model.nu)
+    arrays.samples[rows] = flat.reshape(len(rows), -1, model.nq + model.nu)
 
 
-def _lanes_message(
+def _lane_message(
     model: CompiledScene, library: FusedLibrary, system: SceneSystem, outcome: Any,
     span: tuple[float, float],
 ) -> str:  # fmt: skip
@@ -269,88 +274,96 @@ def _lanes_message(
         return model.looped.failure_text(failure, outcome.fail_time) + last
     component = None if outcome.component < 0 else int(outcome.component)
     failure = Failure(status, float(outcome.fail_time), component, None, int(outcome.code))
-    untold = status in (Status.NOT_FINITE, Status.ACCEPT_FAILED)
-    way_out = "simulate this one alone to learn the cause" if untold else ""
+    unknown_cause = status in (Status.NOT_FINITE, Status.ACCEPT_FAILED)
+    hint = "simulate this trajectory alone to find the cause" if unknown_cause else ""
     if status is Status.POLE and (pole := model.packed.time_map(*span).pole):
-        way_out = pole[1]
-    return failure_text(failure, system.components(), cause=way_out) + last
+        hint = pole[1]
+    return failure_text(failure, system.components(), cause=hint) + last
 
 
-def _one_by_one(
-    models: list[CompiledScene], given: BatchInputs, settings: Settings, q: Array, u: Array,
-    which: NDArray[np.int64], rows: _Rows, threads: int,
+def _run_sequentially(
+    models: list[CompiledScene], given_inputs: BatchInputs, settings: Settings, q: Array, u: Array,
+    rows: NDArray[np.int64], arrays: _BatchArrays, threads: int,
 ) -> None:  # fmt: skip
-    compiled = {id(m): _scalar(m, settings) for m in models}
+    codes = {id(m): _sequential_code(m, settings) for m in models}
     stop = threading.Event()
 
-    def look(_: Integrator) -> None:
+    def check_stop(_: Integrator) -> None:
         if stop.is_set():
-            raise _Stopped
+            raise _BatchStopped
 
     def run(i: int) -> None:
         try:
-            model, code = given.model(models[i], i), compiled[id(models[i])]
+            model, code = given_inputs.model(models[i], i), codes[id(models[i])]
             if code is not None:
                 code = replace(code, numbers=model.fusion.numbers)
-            _alone(model, code, settings, q[i], u[i], i, rows, look)
-        except _Stopped:
+            _run_trajectory(model, code, settings, q[i], u[i], i, arrays, check_stop)
+        except _BatchStopped:
             return
-        except MstmmError as error:  # this trajectory's own affair
-            rows.messages[i] = str(error)
+        except MstmmError as error:  # the failure of one trajectory does not end the batch
+            arrays.messages[i] = str(error)
 
-    on_threads(run, which.tolist(), threads, stop)
-
-
-class _Stopped(Exception):
-    """The batch has ended."""
+    run_on_threads(run, rows.tolist(), threads, stop)
 
 
-def _scalar(model: CompiledScene, settings: Settings) -> SceneCode | None:
-    """Everything that the trajectories share, before they begin on threads of their own."""
+class _BatchStopped(Exception):
+    """The batch was interrupted or has failed."""
+
+
+def _sequential_code(model: CompiledScene, settings: Settings) -> SceneCode | None:
+    """Fused code for one state at a time, built before the threads start; None without code."""
     library = model.fusion.ready(math.inf)
     if library is None:
         return None
-    asks = settings.method == AUTO or get(settings.method).implicit
-    implicit = model.fusion.ready_implicit(math.inf) if asks else None
+    is_implicit = settings.method == AUTO or get(settings.method).implicit
+    implicit = model.fusion.ready_implicit(math.inf) if is_implicit else None
     fusion = model.fusion
     return SceneCode(library, None, fusion.numbers, fusion.inputs, lambda: implicit)
 
 
-def _alone(
-    model: CompiledScene, compiled: SceneCode | None, settings: Settings, q: Array, u: Array,
-    i: int, rows: _Rows, look: Callable[[Integrator], None],
+def _run_trajectory(
+    model: CompiledScene, code: SceneCode | None, settings: Settings, q: Array, u: Array,
+    i: int, arrays: _BatchArrays, check_stop: Callable[[Integrator], None],
 ) -> None:  # fmt: skip
-    system = SceneSystem(model.looped, compiled, with_power=False)
+    system = SceneSystem(model.looped, code, with_power=False)
     run = make_run(system, settings, q, u)
-    choice = choice_of(system, settings, run)
-    status = advance(run, look, choice=choice)
-    found = trajectory(system, run, settings, status, status_message(system, run, status))
-    places = np.searchsorted(np.asarray(settings.output_times), found.t)
-    rows.samples[i, places] = np.concatenate([found.q, found.u], axis=1)
-    rows.memory[i, places] = found.memory
-    rows.success[i], rows.messages[i] = found.success, found.message
-    rows.evaluations[i] = found.statistics.evaluations
-    rows.methods[i] = () if choice is None else tuple(choice.stretches)
+    choice = method_choice(system, settings, run)
+    status = advance(run, check_stop, choice=choice)
+    result = trajectory(system, run, settings, status, status_message(system, run, status))
+    columns = np.searchsorted(np.asarray(settings.output_times), result.t)
+    arrays.samples[i, columns] = np.concatenate([result.q, result.u], axis=1)
+    arrays.memory[i, columns] = result.memory
+    arrays.success[i], arrays.messages[i] = result.success, result.message
+    arrays.evaluations[i] = result.statistics.evaluations
+    arrays.methods[i] = () if choice is None else tuple(choice.stretches)
 
 
 def prepare_batch(
     model: CompiledScene, settings: Settings, initial: tuple[ArrayLike, ArrayLike]
 ) -> tuple[Settings, Array, Array]:
-    """(settings with output times, q (n, nq), u (n, nu)) of a batch; SceneError for a misfit."""
+    """Validated settings with output times, q (n, nq) and u (n, nu) of a batch.
+
+    Raises SceneError for invalid settings or array sizes.
+    """
     settings = validate(settings)
     if not settings.t_end > settings.t_start:
-        raise SceneError(f"t_end = {settings.t_end:g}: expected a time in s, after t_start")
+        raise SceneError(
+            f"t_end: expected a time after t_start = {settings.t_start:g} s, found "
+            f"{settings.t_end:g} s"
+        )
     if settings.output_times is None:
         settings = replace(settings, output_times=(settings.t_end,))
     if not settings.output_times:
-        raise SceneError("output_times: expected one time in s or more")
+        raise SceneError("output_times: expected at least one time in s, found none")
     if settings.method in (*external_integrators.METHODS, *classical_run.METHODS):
-        raise SceneError(f'method "{settings.method}" makes one run at a time: use simulate')
+        raise SceneError(f'method "{settings.method}" cannot run batches; use simulate')
     tableau = get(settings.first_method)
     check_size(tableau, model.nq + model.nu)
     check_steps(tableau, settings.step)
     q, u = split_state("initial_states", initial)
     lead, (q_rows, u_rows) = batch(("initial q", q, model.nq), ("initial u", u, model.nu))
     if len(lead) > 1:
-        raise SceneError(f"initial_states have {len(lead)} leading axes, expected one: (n, nq)")
+        raise SceneError(
+            f"initial_states: expected one leading axis, (n, nq) and (n, nu), found {len(lead)}"
+        )
     return settings, q_rows, u_rows

@@ -1,4 +1,4 @@
-"""Work on threads that Ctrl-C and SIGTERM end."""
+"""Threads that Ctrl-C and SIGTERM interrupt."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..integration_run import SLICE
 T = TypeVar("T")
 
 
-def on_threads(
+def run_on_threads(
     work: Callable[[T], None], items: Iterable[T], threads: int, stop: threading.Event
 ) -> None:
-    """Do `work` for every item.  The first exception of one of them is raised.
+    """Call `work` for every item on several threads, and raise the first exception of a call.
 
-    Where it fails or is interrupted `stop` is set, which work has to look at often, and what has
-    not begun does not begin.  Raises KeyboardInterrupt after an interrupt, once all have stopped.
+    After a failure or an interrupt `stop` is set, which `work` must check often, and no further
+    call starts.  Raises KeyboardInterrupt after an interrupt, once all threads have stopped.
     """
     with record_interrupts() as interrupted, ThreadPoolExecutor(threads) as pool:
         futures = [pool.submit(work, item) for item in items]

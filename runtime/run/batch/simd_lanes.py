@@ -1,4 +1,4 @@
-"""Trajectories in the lanes of vectors, on threads: a thin hold on `integrate/c/simd_lanes.c`."""
+"""Trajectories in SIMD lanes and on threads: the interface to `integrate/c/simd_lanes.c`."""
 
 from __future__ import annotations
 
@@ -24,12 +24,14 @@ from ...packing.records.memory import Memory
 from ...packing.records.model_record import write_inputs
 from ..integration_run import SLICE
 from ..scene_system import SceneSystem
-from .interruptible_threads import on_threads
+from .interruptible_threads import run_on_threads
 
 
 class LaneInputs:
-    """Inputs of every trajectory as compiled code reads them: what stands still in its row of
-    `numbers` (n, np), which is filled in, the others as records."""
+    """Inputs of all trajectories as fused code reads them.
+
+    Constant inputs are written to the rows of `numbers` (n, np), varying ones to `records`.
+    """
 
     def __init__(
         self,
@@ -45,22 +47,24 @@ class LaneInputs:
             if (row >= 0).any() and any(channel[k].varies for channel in channels)
         ]  # fmt: skip
         for k, row in enumerate(places):
-            there = row >= 0
-            if there.any() and k not in self.moving:
-                numbers[:, row[there]] = [np.array(one[k].at(0.0))[there] for one in channels]
+            is_read = row >= 0
+            if is_read.any() and k not in self.moving:
+                numbers[:, row[is_read]] = [
+                    np.array(channel[k].at(0.0))[is_read] for channel in channels
+                ]
         self.places = np.ascontiguousarray(places[self.moving])
-        several = [channel[k] for channel in channels for k in self.moving]
-        self.records = write_inputs(several, [-1] * len(several), self.memory)
+        varying = [channel[k] for channel in channels for k in self.moving]
+        self.records = write_inputs(varying, [-1] * len(varying), self.memory)
 
     def fill(self, view: Any, ffi: Any) -> None:
-        """Tell the lanes of a thread."""
+        """Write the varying inputs to a `mstmm_scene_lanes`."""
         view.live.n, view.live.inputs = len(self.moving), self.records
         view.live.places = ffi.from_buffer("int[]", self.places)
 
 
 @dataclass
 class Lanes:
-    """What all trajectories share, and a system per thread for what it settles."""
+    """Common data of all trajectories, and a system per thread for projections."""
 
     engine: LoopedEngine
     library: FusedLibrary
@@ -72,38 +76,41 @@ class Lanes:
 
 
 def run_lanes(lanes: Lanes, start: Array) -> tuple[Array, Any]:
-    """Samples (n, times, width), nan where a trajectory did not come, and n `mstmm_outcome`."""
+    """Samples (n, times, width), nan at times not reached, and n `mstmm_outcome`."""
     ffi, lib, settings = lanes.engine.ffi, lanes.engine.lib, lanes.settings
     n, times = len(start), np.asarray(settings.output_times, dtype=np.float64)
     samples, last = np.full((n, len(times), lanes.width), np.nan), np.zeros((n, lanes.width))
     outcomes = ffi.new("mstmm_outcome[]", n)
     many = ffi.new("mstmm_many *")
-    kept = _problem(lanes, many.problem, times)
+    keep_alive = _fill_problem(lanes, many.problem, times)
     many.n, many.outcomes = n, outcomes
-    arrays = [lanes.engine.pointer(array) for array in (start, samples, last)]
-    many.y0, many.samples, many.last = arrays
+    pointers = [lanes.engine.pointer(array) for array in (start, samples, last)]
+    many.y0, many.samples, many.last = pointers
     numbers = lanes.engine.pointer(lanes.numbers)
     stop = threading.Event()
-    groups = [_group(lanes, many, system, numbers, kept) for system in lanes.systems]
+    groups = [_make_group(lanes, many, system, numbers, keep_alive) for system in lanes.systems]
     for group in groups:
         if lib.mstmm_group_start(group):
-            raise SceneError("simulate_batch: check t_end, above t_start, and the tolerances")
+            raise SceneError(
+                "simulate_batch: invalid settings; check t_end, after t_start, and the tolerances"
+            )
 
     def work(group: Any) -> None:
         while not stop.is_set():
             if lib.mstmm_group_advance(group, SLICE) == Status.FINISHED:
                 return
 
-    on_threads(work, groups, len(groups), stop)
+    run_on_threads(work, groups, len(groups), stop)
     return samples, outcomes
 
 
-def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
-    """Fills the run that all trajectories copy; returns what it points to."""
+def _fill_problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
+    """Fill the run that all trajectories copy; returns the objects it points to."""
     engine, settings = lanes.engine, lanes.settings
     atol = np.full(lanes.width, float(settings.atol))
-    known = engine.packed.time_map(settings.t_start, settings.t_end)
-    arrays = [np.array(x) for x in (atol, known.breaks, times, known.starts, known.longest)]
+    time_map = engine.packed.time_map(settings.t_start, settings.t_end)
+    starts, longest = time_map.starts, time_map.longest
+    arrays = [np.array(x) for x in (atol, time_map.breaks, times, starts, longest)]
     pointers = [engine.pointer(array) for array in arrays]
     run.tableau = c_tableau(engine.ffi, get(settings.method))
     run.t_start, run.t_end, run.rtol = settings.t_start, settings.t_end, settings.rtol
@@ -111,26 +118,28 @@ def _problem(lanes: Lanes, run: Any, times: Array) -> list[Any]:
     run.max_step, run.max_steps = settings.max_step, settings.max_steps
     run.first_step = settings.first_step
     run.atol, run.breaks, run.outputs, run.bound_starts, run.bounds = pointers
-    run.n_breaks, run.n_outputs, run.n_bounds = len(known.breaks), len(times), len(known.starts)
-    end = engine.pointer(np.array([known.pole[0]])) if known.pole else engine.ffi.NULL
-    run.pole = end
-    return [*arrays, *pointers, end]
+    run.n_breaks, run.n_outputs, run.n_bounds = len(time_map.breaks), len(times), len(starts)
+    pole = engine.pointer(np.array([time_map.pole[0]])) if time_map.pole else engine.ffi.NULL
+    run.pole = pole
+    return [*arrays, *pointers, pole]
 
 
-def _group(lanes: Lanes, many: Any, settling: SceneSystem, numbers: Any, kept: list[Any]) -> Any:
-    """`mstmm_group *` of one thread, with workspace and system of its own."""
+def _make_group(
+    lanes: Lanes, many: Any, scene_system: SceneSystem, numbers: Any, keep_alive: list[Any]
+) -> Any:
+    """`mstmm_group *` of one thread, with its own workspace and system."""
     ffi, lib = lanes.engine.ffi, lanes.engine.lib
     group, system = ffi.new("mstmm_group *"), ffi.new("mstmm_system *")
     view = ffi.new("mstmm_scene_lanes *")
-    view.fused, view.p, view.settle = lanes.library.descriptor, numbers, settling.run
+    view.fused, view.p, view.settle = lanes.library.descriptor, numbers, scene_system.run
     view.p_stride = lanes.numbers.shape[1]
     scratch = np.zeros(max(1, lib.mstmm_lanes_numbers(view.fused)))
     view.numbers = lanes.engine.pointer(scratch)
     lib.mstmm_scene_lanes_system(view, system, group)
-    system.n_memory = 0  # where steps end near singular poses is remembered of single runs
+    system.n_memory = 0  # only single runs keep memory of nearly singular configurations
     group.many = many
     workspace = np.zeros(max(1, lib.mstmm_group_size(system, many.problem.tableau)))
     group.workspace = lanes.engine.pointer(workspace)
     lanes.inputs.fill(view, ffi)
-    kept += [system, view, scratch, workspace, lanes.inputs]
+    keep_alive += [system, view, scratch, workspace, lanes.inputs]
     return group

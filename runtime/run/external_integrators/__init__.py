@@ -1,4 +1,4 @@
-"""Integrators of others on the very same compiled call-backs: a second opinion on every run."""
+"""Runs by SciPy and SUNDIALS with the same compiled callbacks, to verify the C loop."""
 
 from .callbacks import Equations as Equations
 from .solver_loop import METHODS as METHODS

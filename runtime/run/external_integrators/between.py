@@ -1,7 +1,7 @@
-"""Where conditions become true between two looks at a step of another integrator.
+"""Event location within a step of an external integrator.
 
-The same search as that of the C loop (runtime/integrate/c/event_location.c): parts of the step are
-halved until bounds of a condition and of its slope leave nothing open.
+The same search as that of the C loop (runtime/integrate/c/event_location.c): intervals of the step
+are bisected until bounds of a condition and of its slope exclude any further crossing.
 """
 
 from __future__ import annotations
@@ -17,18 +17,20 @@ from mstmm.array_validation import Array
 
 from .callbacks import Equations
 
-#: A part of a step is looked at so often at most, until something may have passed unseen and from
-#: then on; it is no shorter than this part of the one between two looks, and a condition that has
-#: not come closer to values nearby is narrow.
-_MOST, _FEW, _FINEST, _NARROW = 2000, 64, 2.0**-40, 1e-6
+#: Largest number of bisections of an interval, and the same once a crossing may have been missed.
+_MAX_BISECTIONS, _MAX_BISECTIONS_AFTER_MISS = 2000, 64
 
-#: Half the way over which slopes of the dense output are taken, as part of the step.
-_ASIDE = 1e-5
+#: Shortest interval, and width of the bounds from which on a crossing counts as possibly missed,
+#: both relative to the first interval.
+_MIN_INTERVAL, _MISS_TOLERANCE = 2.0**-40, 1e-6
+
+#: Half the difference interval for slopes of the dense output, relative to the step.
+_DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
 class Look:
-    """What is watched at a time (s): the values, and the numbers that the conditions read."""
+    """Event functions and switch margins at a time (s), and the numbers that they read."""
 
     t: float
     values: Array
@@ -38,8 +40,8 @@ class Look:
 class Between:
     """Conditions of `system` within one step from `start` to `end` (s).
 
-    `dense` gives its states, `watched` the values of conditions at them.  `unseen` is the first
-    condition that may have passed unseen, and when (s).
+    `dense` gives the states of the step, `watched` the values of conditions at a state.  `unseen`
+    is the first condition of which a crossing may have been missed, and its time (s).
     """
 
     def __init__(
@@ -52,61 +54,69 @@ class Between:
         self.unseen = unseen
 
     def look(self, t: float) -> Look:
-        """All that is watched at a time of the step."""
+        """Values of all conditions at a time (s) of the step."""
         y = self._dense(t)
-        aside = max(_ASIDE * (self._end - self._start), 8 * math.ulp(t))
-        before, after = max(t - aside, self._start), min(t + aside, self._end)
+        delta = max(_DIFFERENCE * (self._end - self._start), 8 * math.ulp(t))
+        before, after = max(t - delta, self._start), min(t + delta, self._end)
         rates = (self._dense(after) - self._dense(before)) / ((after - before) or 1.0)
-        values = self._watched(t, y)  # which is what `see` looks at
+        values = self._watched(t, y)  # before `see`, which reads what this computes
         return Look(t, values, self._system.see(t, y, rates))
 
     def first(self, i: int, sign: float, left: Look, right: Look) -> float | None:
-        """A time (s) shortly behind the first at which number i, by this sign, is above zero, of an
-        event also zero; None where it nowhere is between left and right.  It is not at left."""
-        waiting, taken, first_width = [right], 0, math.inf
-        most = _MOST if self.unseen is None else _FEW
-        finest = max(4 * math.ulp(max(abs(left.t), abs(right.t))), _FINEST * (right.t - left.t))
-        while waiting:
-            to = waiting[-1]
-            bounds = self._system.enclose(left.t, left.seen, to.t, to.seen)[i]
-            open_, highest = _judge(bounds, sign, left, to, i)
-            first_width = min(first_width, bounds[1] - bounds[0])
-            closed, enough = to.t - left.t <= finest, open_ and taken >= most
-            crosses = self._holds(i, sign, to)
-            if open_ and not closed and not enough:
-                waiting.append(self.look(left.t + (to.t - left.t) / 2))
-                taken += 1
+        """Time (s) of the first crossing of condition i between left and right; None without one.
+
+        A crossing is where `sign` times the value becomes positive, for an event also zero; it is
+        not so at left.  The time is the first double after the crossing.
+        """
+        pending, count, min_width = [right], 0, math.inf
+        max_count = _MAX_BISECTIONS if self.unseen is None else _MAX_BISECTIONS_AFTER_MISS
+        rounding = 4 * math.ulp(max(abs(left.t), abs(right.t)))
+        min_interval = max(rounding, _MIN_INTERVAL * (right.t - left.t))
+        while pending:
+            end = pending[-1]
+            bounds = self._system.enclose(left.t, left.seen, end.t, end.seen)[i]
+            undecided, upper = _may_cross(bounds, sign, left, end, i)
+            min_width = min(min_width, bounds[1] - bounds[0])
+            is_short, is_exhausted = (
+                end.t - left.t <= min_interval,
+                undecided and count >= max_count,
+            )
+            crosses = self._is_true(i, sign * float(end.values[i]))
+            if undecided and not is_short and not is_exhausted:
+                pending.append(self.look(left.t + (end.t - left.t) / 2))
+                count += 1
                 continue
-            above = highest - max(sign * left.values[i], sign * to.values[i])
-            if enough or (open_ and not crosses and above > _NARROW * first_width):
+            excess = upper - max(sign * left.values[i], sign * end.values[i])
+            missed = undecided and not crosses and excess > _MISS_TOLERANCE * min_width
+            if is_exhausted or missed:
                 self.unseen = self.unseen or (i, left.t)
             if crosses:
-                return self._located(i, sign, left.t, to.t)
-            left = waiting.pop()
+                return self._bisect(i, sign, left.t, end.t)
+            left = pending.pop()
         return None
 
-    def _holds(self, i: int, sign: float, at: Look) -> bool:
-        value = sign * float(at.values[i])
+    def _is_true(self, i: int, value: float) -> bool:
         return value > 0 or (value == 0 and i < self._system.calls.n_events)
 
-    def _located(self, i: int, sign: float, left: float, right: float) -> float:
+    def _bisect(self, i: int, sign: float, left: float, right: float) -> float:
         while left < (middle := left + (right - left) / 2) < right:
-            value = sign * float(self._watched(middle, self._dense(middle))[i])
-            if value > 0 or (value == 0 and i < self._system.calls.n_events):
+            if self._is_true(i, sign * float(self._watched(middle, self._dense(middle))[i])):
                 right = middle
             else:
                 left = middle
         return right
 
 
-def _judge(bounds: Array, sign: float, left: Look, right: Look, i: int) -> tuple[bool, float]:
-    """Whether more than one crossing, or any besides that at the right end, may lie between; and
-    the highest value there."""
-    _, high, falling, rising = bounds if sign > 0 else -bounds[[1, 0, 3, 2]]
+def _may_cross(bounds: Array, sign: float, left: Look, right: Look, i: int) -> tuple[bool, float]:
+    """True if there may be a crossing besides one at the right end; upper bound of the value.
+
+    `bounds` (4,) are those of the value and of its slope (low, high, low, high).
+    """
+    _, high, min_slope, max_slope = bounds if sign > 0 else -bounds[[1, 0, 3, 2]]
     a, b, h = sign * left.values[i], sign * right.values[i], right.t - left.t
-    if np.isfinite(falling) and np.isfinite(rising) and rising > falling:
-        at = (b - a - falling * h) / (rising - falling)
-        high = min(high, a + rising * min(max(at, 0.0), h))
+    if np.isfinite(min_slope) and np.isfinite(max_slope) and max_slope > min_slope:
+        peak = (b - a - min_slope * h) / (max_slope - min_slope)
+        high = min(high, a + max_slope * min(max(peak, 0.0), h))
     if b >= 0:
-        return not falling >= 0, float(high)
-    return not (high < 0 or falling >= 0 or rising <= 0), float(high)
+        return not min_slope >= 0, float(high)
+    return not (high < 0 or min_slope >= 0 or max_slope <= 0), float(high)

@@ -1,4 +1,4 @@
-"""The call-backs of a scene as integrators written elsewhere ask for them."""
+"""Callbacks of a scene for external integrators: rates, Jacobian, events, accepted steps."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class RunEnded(Exception):
-    """The run is over before its end: why, and a sentence."""
+    """The run ends before t_end, with a status and a message."""
 
     def __init__(self, status: Status, message: str) -> None:
         super().__init__(message)
@@ -26,7 +26,7 @@ class RunEnded(Exception):
 
 
 class Equations:
-    """The call-backs of a model, taken from the C structure and called from Python."""
+    """Callbacks of a model's `mstmm_system`, called from Python."""
 
     def __init__(self, model: CompiledScene) -> None:
         self.engine = model.looped
@@ -55,18 +55,18 @@ class Equations:
         return self._jacobian()(self._inside(t), np.ascontiguousarray(y, dtype=np.float64))
 
     def _inside(self, t: float) -> float:
-        """A break is never seen itself."""
+        """Time strictly between the breaks, where the right-hand side is unique."""
         return min(max(t, self.bounds[0]), self.bounds[1])
 
     def _c(self, array: Array) -> Any:
         return self.ffi.from_buffer("double[]", array)
 
     def events(self, t: float, y: Array) -> Array:
-        """Values of the events; negative where they are not true."""
+        """Values of the events; negative where an event does not hold."""
         return self.watched(t, y)[: self.calls.n_events]
 
     def watched(self, t: float, y: Array) -> Array:
-        """Values of the events, and behind them the margins of switches."""
+        """Values of the events, followed by the margins of switches."""
         values = self.scene.watched(t, y)
         if values is None:
             text = self.engine.failure_text(self.scene.run.failure, t)
@@ -74,34 +74,34 @@ class Equations:
         return values
 
     def see(self, t: float, y: Array, rates: Array) -> Any:
-        """What the conditions read at the state that was `watched` last, for `enclose`."""
-        found = self.ffi.new("double[]", max(1, int(self.calls.n_seen)))
+        """Numbers that the conditions read at the state last given to `watched`, for `enclose`."""
+        numbers = self.ffi.new("double[]", max(1, int(self.calls.n_seen)))
         state, slopes = (np.ascontiguousarray(x, dtype=np.float64) for x in (y, rates))
-        self.calls.see(self.calls.context, t, self._c(state), self._c(slopes), found)
-        return found
+        self.calls.see(self.calls.context, t, self._c(state), self._c(slopes), numbers)
+        return numbers
 
     def enclose(self, left: float, seen_left: Any, right: float, seen_right: Any) -> Array:
-        """(n, 4) of all that is watched between two times (s): low, high and those of the slope."""
-        found = np.empty((self.calls.n_events + self.calls.n_switches, 4))
-        bounds = self.ffi.cast("mstmm_bounds *", self._c(found))
-        self.calls.enclose(self.calls.context, right - left, seen_left, seen_right, bounds)
-        return found
+        """Bounds (n, 4) of all conditions between two times (s): low, high, and of the slope."""
+        bounds = np.empty((self.calls.n_events + self.calls.n_switches, 4))
+        record = self.ffi.cast("mstmm_bounds *", self._c(bounds))
+        self.calls.enclose(self.calls.context, right - left, seen_left, seen_right, record)
+        return bounds
 
     def lets_through(self, event: int, t: float, y: Array, value: float) -> bool:
-        """Whether a state moves on into an event that throws back, whose value there is given."""
+        """True if a state moves into a bounce event, whose value there is given."""
         state = self._c(np.ascontiguousarray(y, dtype=np.float64))
         return bool(self.calls.lets_through(self.calls.context, event, t, state, value))
 
     def remember(self, t: float, y: Array) -> Array:
-        """After a step: memory of turns brought up to date; the settled state."""
+        """Accept a step: update the memory of turns and return the projected state."""
         state = np.array(y)
         if self.calls.accept == self.ffi.NULL:
-            return state  # there is nothing to settle
+            return state
         if self.calls.accept(self.calls.context, t, self._c(state)) > 0:  # below 0: rates change
             text = self.engine.failure_text(self.scene.run.failure, t)
             raise RunEnded(Status.ACCEPT_FAILED, text)
         return state
 
     def fire(self, event: int, t: float, y: Array) -> int:
-        """What it answers; a bounce changes y in place."""
+        """Fire an event and return its action, MSTMM_FIRE_*; a bounce changes y in place."""
         return int(self.calls.fire(self.calls.context, event, t, self._c(y)))

@@ -1,7 +1,7 @@
-"""Runs by integrators of others, step by step.
+"""Runs by the integrators of SciPy and SUNDIALS, step by step.
 
-The classes behind `scipy.integrate.solve_ivp`, and CVODE of SUNDIALS, are driven step by step, so
-that breaks, events, releases, output times and Ctrl-C mean what they mean in the C loop.
+The solver classes of `scipy.integrate`, and CVODE of SUNDIALS, are called step by step, so that
+breaks, events, releases, output times and Ctrl-C have the same effect as in the C loop.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from ...integrate.c_loop import Failure, Samples, Statistics, Status, failure_te
 from ...integrate.settings import Settings
 from ...platform_support.interrupts import Interrupt, record_interrupts
 from ..integration_run import split, tolerances
-from ..run_notes import chattering_note, unseen
-from ..stop_messages import cause_of, end_of_curve, fastest_speed, rest_of
-from ..switch_crossings import Crossings, ProgressCheck, just_before
+from ..run_notes import chattering_note, missed_switch_note
+from ..stop_messages import curve_end_message, expression_cause, fastest_speed, rest_note
+from ..switch_crossings import Crossings, ProgressCheck, shortened_step_end
 from ..trajectory import Trajectory
 from . import sundials
 from .between import Between, Look
@@ -39,74 +39,78 @@ METHODS = {
     f"scipy-{name}": name for name in ("DOP853", "RK45", "RK23", "Radau", "BDF", "LSODA")
 } | sundials.METHODS
 
-#: Those that solve equations in every step, and take their Jacobian.
+#: Solver classes that solve equations in every step and need the Jacobian.
 _IMPLICIT = ("Radau", "BDF", "LSODA")
 
-#: Part of the next flight that the first step behind a blow takes at most, to end in the air.
-_FLIGHT = 0.3
+#: Longest first step after a bounce, relative to the expected next flight, so that it ends before
+#: the next impact.
+_FLIGHT_SHARE = 0.3
 
-#: Points inside a step at which events are looked at.
-_LOOKS = np.linspace(0.0, 1.0, 9)[1:]
+#: Relative times inside a step at which conditions are evaluated.
+_EVALUATION_POINTS = np.linspace(0.0, 1.0, 9)[1:]
 
+#: Consecutive steps without progress in time after which the solver counts as failed.
+_MAX_STUCK_STEPS = 20
 
-#: Steps in a row that do not move the time: the integrator has given up without saying so.
-_STUCK = 20
+#: LSODA before SciPy 1.17 has a single state per process, so that only one run may use it.
+_LSODA_LOCK = RLock()
 
-#: LSODA before SciPy 1.17 keeps its state in one place for the whole process: one run at a time.
-_ONE_LSODA = RLock()
+#: Difference of equal times, relative to the time or to the run.
+_TIME_TOLERANCE = 2.0**-39
 
-#: Two times so near to each other, as part of the time or the run, are one.
-_GAP = 2.0**-39
-
-#: An integrator that keeps its history to itself begins anew where its state is so many tolerances
-#: beside the closed one: its errors are as large anyway, and it begins with steps of order 1.
-_BESIDE = 100.0
+#: Difference between the solver's state and the projected one, in tolerances, from which on a
+#: solver with inaccessible history restarts.  Its own errors are as large, and each restart costs
+#: steps of order 1.
+_RESTART_DIFFERENCE = 100.0
 
 
 def integrate(
-    model: CompiledScene, settings: Settings, q: Array, u: Array, tell: Callable[[float], None]
+    model: CompiledScene,
+    settings: Settings,
+    q: Array,
+    u: Array,
+    report_time: Callable[[float], None],
 ) -> Trajectory:
-    """One run by SciPy, or by SUNDIALS.
+    """Run the model from (nq,), (nu,) by SciPy or by SUNDIALS.
 
-    Raises SceneError for a fixed step, and by SUNDIALS for a scene without coordinates;
-    EnvironmentFailure where the package is not installed.
+    `report_time` receives the reached time in s.  Raises SceneError for a fixed step, and with
+    SUNDIALS for a scene without coordinates; EnvironmentFailure where the package is not installed.
     """
     if settings.step is not None:
-        raise SceneError(f'method "{settings.method}" chooses its own steps: leave step out')
+        raise SceneError(f'method "{settings.method}" chooses its own steps; leave step out')
     if settings.method in sundials.METHODS:
-        sundials.refuse_without(settings.method)
+        sundials.require_package(settings.method)
         if not model.nq + model.nu:
             raise SceneError(
-                f'method "{settings.method}": CVODE takes no scene in which nothing can move; '
+                f'method "{settings.method}": CVODE does not support a scene without coordinates; '
                 "use another method, such as dop853"
             )
-    alone: AbstractContextManager[object] = nullcontext()
+    lock: AbstractContextManager[object] = nullcontext()
     if METHODS[settings.method] == "LSODA":
-        alone = _ONE_LSODA
-    with alone:
-        return _Loop(model, settings, tell).run(q, u)
+        lock = _LSODA_LOCK
+    with lock:
+        return _Loop(model, settings, report_time).run(q, u)
 
 
 class _Loop:
     """Steps, breaks, events and samples of one run."""
 
     def __init__(
-        self, model: CompiledScene, settings: Settings, tell: Callable[[float], None]
+        self, model: CompiledScene, settings: Settings, report_time: Callable[[float], None]
     ) -> None:
-        self.system, self.settings, self.tell = Equations(model), settings, tell
+        self.system, self.settings, self.report_time = Equations(model), settings, report_time
         self.implicit = METHODS[settings.method] in _IMPLICIT
         self.rows: list[tuple[float, Array, Array, int]] = []
         self.outputs = None if settings.output_times is None else deque(settings.output_times)
-        self.steps = self.fired = 0
-        #: The last event, and how long before it another was, s.
-        self.met, self.apart = settings.t_start, 0.0
+        self.steps = self.event_count = 0
+        #: Time of the last event, and time between the last two events, s.
+        self.event_time, self.event_interval = settings.t_start, 0.0
         bounces = self.system.engine.packed.watched.bounces
-        #: Part of its speed, at least, with which what is thrown back leaves; which events do that,
-        #: and the one that has just done it.
-        self.thrown = min((bounce.restitution for bounce in bounces), default=1.0)
-        self.bounces = {bounce.event for bounce in bounces}
-        self.aloft: int | None = None
-        #: What is met at the end of the last step, though closing loops may have drawn it back.
+        self.min_restitution = min((bounce.restitution for bounce in bounces), default=1.0)
+        self.bounces = {bounce.event for bounce in bounces}  # numbers of bounce events
+        self.last_bounce: int | None = None  # bounce event from which the present step starts
+        #: Bounce event at the end of the last step, to fire even if the projection onto closed
+        #: loops has moved the state back from it.
         self.due: int | None = None
         self.sizes: list[float] = []
         self.t, self.last = settings.t_start, np.zeros(0)
@@ -114,168 +118,175 @@ class _Loop:
         calls = self.system.calls
         self.n_events = int(calls.n_events)
         self.closes = self.system.engine.packed.system.closes
-        self.truth = np.zeros(self.n_events, dtype=bool)
+        self.is_true = np.zeros(self.n_events, dtype=bool)
         self.crossings = Crossings(int(calls.n_switches), settings.t_end - settings.t_start)
         self.unseen: tuple[int, float] | None = None
-        self.sight = ProgressCheck(settings.t_start, settings.t_end)
-        self.known = self.system.engine.packed.time_map(settings.t_start, settings.t_end)
+        self.progress = ProgressCheck(settings.t_start, settings.t_end)
+        self.time_map = self.system.engine.packed.time_map(settings.t_start, settings.t_end)
 
     def run(self, q: Array, u: Array) -> Trajectory:
         scene, settings = self.system.scene, self.settings
         y = scene.begin(settings.t_start, q, u)
         self.last, self.atol = y, tolerances(scene, settings, y)
-        stops = np.union1d(self.known.breaks, self.known.starts).tolist()
+        stops = np.union1d(self.time_map.breaks, self.time_map.starts).tolist()
         inner = [b for b in stops if settings.t_start < b < settings.t_end]
         status: Status | None
         with record_interrupts() as self.interrupted:
             try:
                 self.sample(self.t, y)
                 for stop in [*inner, settings.t_end]:
-                    y = self.piece(y, stop)
+                    y = self.run_piece(y, stop)
                 status, message = Status.FINISHED, f"finished at t = {self.t:.9g} s"
             except RunEnded as ended:
                 status, message = ended.status, ended.message
             except KeyboardInterrupt:
                 status, message = None, f"interrupted at t = {self.t:.9g} s"
-        found = split(
+        result = split(
             scene, self.samples(), settings, status, message, self.statistics(),
             (self.t, self.last),
         )  # fmt: skip
         chatter = self.crossings.chatter
         risks = [] if chatter is None else [chattering_note(scene, chatter)]
-        risks += [] if self.unseen is None else [unseen(scene, *self.unseen)]
-        return replace(found, risks=tuple(risks))
+        risks += [] if self.unseen is None else [missed_switch_note(scene, *self.unseen)]
+        return replace(result, risks=tuple(risks))
 
-    def piece(self, y: Array, stop: float) -> Array:
-        """From self.t to the next break, with a new integrator after every event.
+    def run_piece(self, y: Array, stop: float) -> Array:
+        """Run from self.t to the break at `stop` (s), with a new solver after every event.
 
-        Between two breaks that are one but for rounding nothing changes.
+        Breaks that differ only by rounding count as one.
         """
-        if self.known.pole is not None and self.t >= self.known.pole[0]:
-            found = Failure(Status.POLE, self.t, None, None, 0)
+        pole = self.time_map.pole
+        if pole is not None and self.t >= pole[0]:
+            failure = Failure(Status.POLE, self.t, None, None, 0)
             at = f"last good state at t = {self.t:.9g} s"
-            raise RunEnded(Status.POLE, f"{failure_text(found, cause=self.known.pole[1])}; {at}")
+            raise RunEnded(Status.POLE, f"{failure_text(failure, cause=pole[1])}; {at}")
         if self.is_now(stop):
             self.t = stop
             return y
         self.system.bounds = (np.nextafter(self.t, np.inf), np.nextafter(stop, -np.inf))
         while self.t < stop:
-            if self.fire_here(y):
+            if self.fire_events(y):
                 continue
-            y = self.stretch(y, stop)
-        self.fire_here(y)
+            y = self.run_solver(y, stop)
+        self.fire_events(y)
         return y
 
     def is_now(self, t: float) -> bool:
-        """Whether a time is this one, but for rounding."""
+        """True if a time (s) equals self.t up to rounding."""
         span = self.settings.t_end - self.settings.t_start
-        return abs(t - self.t) <= _GAP * max(abs(self.t), span)
+        return abs(t - self.t) <= _TIME_TOLERANCE * max(abs(self.t), span)
 
-    def stretch(self, y: Array, stop: float) -> Array:
-        """Steps of one integrator, up to `stop`, an event or a switch.
+    def run_solver(self, y: Array, stop: float) -> Array:
+        """Make steps with one solver, up to `stop` (s), an event or a switch.
 
-        A step with a switch in it is made again, to end just before; see phase_switch in C.
+        A step with a switch in it is repeated, to end just before the switch; see phase_switch in
+        C.
         """
-        self.refuse_start(y)
-        solver, stuck = self.solver(y, stop), 0
+        self.check_start(y)
+        solver, stuck_steps = self.make_solver(y, stop), 0
         while solver.status == "running":
-            self.look()
+            self.check_interrupt()
             text = self.step(solver)
             if solver.status == "failed" or not np.isfinite(solver.y).all():
-                raise self.failed(solver.y, text)
-            if not self.sight.has_end(float(solver.t)):
-                raise self.endless()
-            stuck = stuck + 1 if solver.t == solver.t_old else 0
-            if stuck > _STUCK:
-                raise self.failed(solver.y, "the steps have become too small")
+                raise self.failure(solver.y, text)
+            if not self.progress.has_end(float(solver.t)):
+                raise self.no_progress()
+            stuck_steps = stuck_steps + 1 if solver.t == solver.t_old else 0
+            if stuck_steps > _MAX_STUCK_STEPS:
+                raise self.failure(solver.y, "the steps have become too small")
             self.steps += 1
             self.sizes.append(solver.t - solver.t_old)
             switch = self.first_switch(solver)
             if switch is not None and not self.crossings.is_short(switch[1] - solver.t_old):
                 self.steps -= 1
                 self.sizes.pop()
-                return self.stretch(self.last, just_before(solver.t_old, switch[1]))
+                return self.run_solver(self.last, shortened_step_end(solver.t_old, switch[1]))
             event = self.first_event(solver, switch)
             end = solver.t if event is None else event[1]
             dense = solver.dense_output()
-            self.outputs_until(dense, end, event is not None)
+            self.sample_outputs(dense, end, event is not None)
             y = solver.y if event is None else dense(end)
             self.t, self.last = float(end), self.system.remember(end, y)
-            self.tell(end)
+            self.report_time(end)
             if event is not None:
-                self.crossed(event)
+                self.note_crossing(event)
                 return np.array(self.last)
             self.sample(end, solver.y)
             values = self.events(end, solver.y)
-            self.truth &= values >= 0
-            self.refuse_unseen_flight()
-            self.refuse_let_through(solver.y, values)
-            if self.closes and not _goes_on(solver, self.last, self.atol, self.settings.rtol):
+            self.is_true &= values >= 0
+            self.check_bounce_height()
+            self.check_pass_through(solver.y, values)
+            if self.closes and not _accepts_projection(
+                solver, self.last, self.atol, self.settings.rtol
+            ):
                 break
         return np.array(self.last)
 
-    def refuse_unseen_flight(self) -> None:
-        """What does not leave by a fraction of its flight flies lower than the tolerances see."""
-        thrown, self.aloft = self.aloft, None
-        if thrown is not None and self.truth[thrown]:
-            raise self.stopped(thrown)
+    def check_bounce_height(self) -> None:
+        """Stop at a bounce event that still holds after the first step away from it.
 
-    def refuse_let_through(self, y: Array, values: Array) -> None:
-        """What lies on an event that throws back is not thrown back by it."""
+        The flight is then lower than the tolerances resolve.
+        """
+        bounce, self.last_bounce = self.last_bounce, None
+        if bounce is not None and self.is_true[bounce]:
+            raise self.stopped(bounce)
+
+    def check_pass_through(self, y: Array, values: Array) -> None:
+        """Stop a run that moves from rest on a bounce event into it, where nothing bounces."""
         for event in self.bounces:
-            if self.truth[event] and self.system.lets_through(event, self.t, y, values[event]):
-                found = Failure(Status.LET_THROUGH, self.t, None, event, 0)
-                text = failure_text(found, events=self.system.scene.event_names)
+            if self.is_true[event] and self.system.lets_through(event, self.t, y, values[event]):
+                failure = Failure(Status.LET_THROUGH, self.t, None, event, 0)
+                text = failure_text(failure, events=self.system.scene.event_names)
                 raise RunEnded(Status.LET_THROUGH, text)
 
     def stopped(self, event: int) -> RunEnded:
-        """The end of a run that an event stops, or what comes to rest there."""
+        """End of the run at an event that stops it, or where its bounces come to rest."""
         scene = self.system.scene
-        said = f"stopped by {scene.event_names[event]} at t = {self.t:.9g} s"
-        rest = rest_of(scene, event)
-        return RunEnded(Status.CAME_TO_REST if rest else Status.STOPPED, said + rest)
+        message = f"stopped by {scene.event_names[event]} at t = {self.t:.9g} s"
+        note = rest_note(scene, event)
+        return RunEnded(Status.CAME_TO_REST if note else Status.STOPPED, message + note)
 
-    def refuse_start(self, y: Array) -> None:
-        """SciPy chooses its first step from the rates: from nan a step that never ends."""
+    def check_start(self, y: Array) -> None:
+        """Stop if the rates are not finite: SciPy's choice of a first step would not end."""
         self.system.failure = ""
         rates = self.system.rates(self.t, y)
         if not np.isfinite(rates).all():
-            raise self.failed(rates, None)
+            raise self.failure(rates, None)
 
-    def look(self) -> None:
-        """Between evaluations: has somebody asked for the end?"""
+    def check_interrupt(self) -> None:
+        """Raise KeyboardInterrupt after an interrupt."""
         if self.interrupted:
             raise KeyboardInterrupt
 
     def step(self, solver: Any) -> str | None:
-        """One step; a sentence where it fails."""
+        """Make one step; returns a sentence if it fails."""
         limit = self.settings.max_steps
         if limit and self.steps >= limit:
             at = f"t = {self.t:.9g} s"
-            text = f"more steps than allowed at {at}; last good state at {at}"
-            raise RunEnded(Status.TOO_MANY_STEPS, text)
+            message = f"more steps than allowed at {at}; last good state at {at}"
+            raise RunEnded(Status.TOO_MANY_STEPS, message)
         self.system.failure = ""
         try:
-            with np.errstate(all="ignore"):  # nan is how a bad trial step shows
-                found: str | None = solver.step()
+            with np.errstate(all="ignore"):  # bad trial steps produce nan
+                text: str | None = solver.step()
         except (ValueError, np.linalg.LinAlgError) as error:
-            found, solver.status = str(error), "failed"
-        return found
+            text, solver.status = str(error), "failed"
+        return text
 
-    def endless(self) -> RunEnded:
-        """At the pace of the last steps the run would never end."""
-        end = end_of_curve(self.system.scene, self.t, self.last, self.t)
-        if end:
-            text = f"{end}; last good state at t = {self.t:.9g} s"
+    def no_progress(self) -> RunEnded:
+        """End of a run whose steps are too short for it to reach t_end."""
+        curve_end = curve_end_message(self.system.scene, self.t, self.last, self.t)
+        if curve_end:
+            text = f"{curve_end}; last good state at t = {self.t:.9g} s"
             return RunEnded(Status.TOO_MANY_STEPS, text)
-        sticks = Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1)
-        text = failure_text(sticks, implicit=self.implicit)
+        failure = Failure(Status.TOO_MANY_STEPS, self.t, None, None, 1)
+        text = failure_text(failure, implicit=self.implicit)
         if self.crossings.chatter is not None:
             text += f"; {chattering_note(self.system.scene, self.crossings.chatter)}"
         return RunEnded(Status.TOO_MANY_STEPS, text)
 
-    def crossed(self, event: tuple[int, float]) -> None:
-        """The step ended where a switch crosses, or what an event strikes is met."""
+    def note_crossing(self, event: tuple[int, float]) -> None:
+        """Note the switch or the bounce event at which the last step ended."""
         if event[0] in self.bounces:
             self.due = event[0]
         if event[0] >= self.n_events:
@@ -283,76 +294,79 @@ class _Loop:
             if self.outputs is None:
                 self.sample(self.t, self.last)
 
-    def solver(self, y: Array, stop: float) -> Any:
+    def make_solver(self, y: Array, stop: float) -> Any:
         import scipy.integrate
 
         method = self.settings.method
-        name, longest = METHODS[method], self.longest_step()
+        name, max_step = METHODS[method], self.max_step()
         first = self.settings.first_step if self.t == self.settings.t_start else 0.0
-        if self.apart:  # events that follow ever faster are not to be stepped over
-            first = self.apart * _FLIGHT * self.thrown
+        if self.event_interval:  # the first step must not miss the next of accumulating events
+            first = self.event_interval * _FLIGHT_SHARE * self.min_restitution
         first = min(first, stop - self.t)
-        common = {"rtol": max(self.settings.rtol, 2.3e-14), "atol": self.atol}
+        tolerances = {"rtol": max(self.settings.rtol, 2.3e-14), "atol": self.atol}
         if method in sundials.METHODS:
             return sundials.Cvode(
                 method, self.rates, self.system.jacobian, self.t, y, stop, first_step=first,
-                max_step=longest, **common,
+                max_step=max_step, **tolerances,
             )  # fmt: skip
-        more = {"jac": self.system.jacobian} if name in _IMPLICIT else {}
+        jacobian = {"jac": self.system.jacobian} if name in _IMPLICIT else {}
         return getattr(scipy.integrate, name)(
-            self.rates, self.t, y, stop, max_step=longest, first_step=first or None, **common,
-            **more,
+            self.rates, self.t, y, stop, max_step=max_step, first_step=first or None, **tolerances,
+            **jacobian,
         )  # fmt: skip
 
-    def longest_step(self) -> float:
-        """What max_step and the loads allow from self.t to the next stop."""
-        starts, longest = self.known.starts, self.known.longest
-        here = int(np.searchsorted(starts, self.t, side="right")) - 1
-        bound = float(longest[here]) if here >= 0 else np.inf
+    def max_step(self) -> float:
+        """Longest step (s) that the settings and the loads permit from self.t on."""
+        starts, longest = self.time_map.starts, self.time_map.longest
+        piece = int(np.searchsorted(starts, self.t, side="right")) - 1
+        bound = float(longest[piece]) if piece >= 0 else np.inf
         return min(self.settings.max_step or np.inf, bound)
 
     def rates(self, t: float, y: Array) -> Array:
-        """Rates for a step of SciPy's, which a step of endless trials does not outlive."""
+        """dy/dt; an interrupt ends a step here, even one with endless trials."""
         if METHODS[self.settings.method] != "LSODA":  # no exception passes through its C code
-            self.look()
+            self.check_interrupt()
         return self.system.rates(t, y)
 
-    def failed(self, y: Array, text: str | None) -> RunEnded:
+    def failure(self, y: Array, text: str | None) -> RunEnded:
+        """End of the run after a failed step; y is the solver's state or the rates."""
         at = f"last good state at t = {self.t:.9g} s"
         status = Status.RHS_FAILED if self.system.failure else Status.STEP_TOO_SMALL
-        cause = cause_of(self.system.scene, status, self.t, self.last, self.t, self.implicit)
+        cause = expression_cause(
+            self.system.scene, status, self.t, self.last, self.t, self.implicit
+        )
         if cause or self.system.failure:
             return RunEnded(status, f"{cause or self.system.failure}; {at}")
         if not np.isfinite(y).all():
             name = self.system.scene.components()[int(np.argmin(np.isfinite(y)))]
             return RunEnded(Status.NOT_FINITE, f"not finite: {name}; {at}")
         text = (text or "the integrator failed").strip(". ")
-        where = fastest_speed(self.system.scene, self.t, self.last)
-        return RunEnded(status, f"{text}; {at}{where}")
+        note = fastest_speed(self.system.scene, self.t, self.last)
+        return RunEnded(status, f"{text}; {at}{note}")
 
     # --- events ---------------------------------------------------------------------------------
 
     def events(self, t: float, y: Array) -> Array:
-        """Conditions at a state; one that is not a number ends the run."""
+        """Values of the events at a state; a value that is nan ends the run."""
         return self.watched(t, y)[: self.n_events]
 
     def watched(self, t: float, y: Array) -> Array:
-        """The same, and behind them the margins of switches."""
-        found = self.system.watched(t, y)
-        no_number = np.isnan(found[: self.n_events])
-        if no_number.any():
-            name = self.system.scene.event_names[int(np.argmax(no_number))]
+        """Values of the events, then margins of switches; an event value of nan ends the run."""
+        values = self.system.watched(t, y)
+        is_nan = np.isnan(values[: self.n_events])
+        if is_nan.any():
+            name = self.system.scene.event_names[int(np.argmax(is_nan))]
             text = f"the condition of {name} is not a number at t = {t:.9g} s"
             at = f"last good state at t = {self.t:.9g} s"
             raise RunEnded(Status.EVENT_FAILED, f"{text}; {at}")
-        return found
+        return values
 
-    def fire_here(self, y: Array) -> bool:
-        """Fire what has become true at self.t; True if the integrator must start again."""
+    def fire_events(self, y: Array) -> bool:
+        """Fire an event that has become true at self.t; True if the solver must restart."""
         values = self.events(self.t, y)
-        self.truth &= values >= 0
+        self.is_true &= values >= 0
         self.last = np.array(y)
-        rising = (values >= 0) & ~self.truth
+        rising = (values >= 0) & ~self.is_true
         due, self.due = self.due, None
         if due is not None:
             rising[due] = True
@@ -363,35 +377,36 @@ class _Loop:
     def fire(self, event: int, y: Array) -> bool:
         lib, t = self.system.engine.lib, self.t
         before = (t, np.array(y), np.array(self.system.scene.memory), -(event + 1))
-        answer = self.system.fire(event, t, y)
+        action = self.system.fire(event, t, y)
         self.last = np.array(y)
-        self.truth[event], self.fired = True, self.fired + 1
-        if not self.is_now(self.met):
-            self.met, self.apart = t, t - self.met
+        self.is_true[event], self.event_count = True, self.event_count + 1
+        if not self.is_now(self.event_time):
+            self.event_time, self.event_interval = t, t - self.event_time
         if self.rows and self.rows[-1][0] == t and np.array_equal(self.rows[-1][1], y):
             self.rows.pop()
-        if answer != lib.MSTMM_FIRE_STOP:
+        if action != lib.MSTMM_FIRE_STOP:
             self.rows.append(before)
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), event + 1))
-        if answer == lib.MSTMM_FIRE_STOP:
+        if action == lib.MSTMM_FIRE_STOP:
             raise self.stopped(event)
-        self.aloft = event if self.apart and event in self.bounces else None
+        is_repeated_bounce = self.event_interval and event in self.bounces
+        self.last_bounce = event if is_repeated_bounce else None
         return True
 
     def first_switch(self, solver: Any) -> tuple[int, float] | None:
-        """(number behind the events, time) of the first switch that crosses in the step."""
+        """(n_events + switch, time) of the first switch that crosses in the last step."""
         if not self.crossings.n:
             return None
-        between, n = self.between(solver), self.n_events
-        left = between.look(float(solver.t_old))
-        signs = -np.sign(left.values)  # of what is to become true; 0 until a switch leaves zero
-        for place in solver.t_old + _LOOKS * (solver.t - solver.t_old):
-            right = between.look(float(place))
-            numbers = np.flatnonzero(self.crossings.watched) + n
-            watched = [i for i in numbers.tolist() if signs[i]]
-            found = self.first_of(between, watched, signs, left, right)
-            if found is not None:
-                return found
+        conditions, n = self.conditions(solver), self.n_events
+        left = conditions.look(float(solver.t_old))
+        signs = -np.sign(left.values)  # signs after a crossing; 0 until a switch leaves zero
+        for t in solver.t_old + _EVALUATION_POINTS * (solver.t - solver.t_old):
+            right = conditions.look(float(t))
+            indices = np.flatnonzero(self.crossings.watched) + n
+            indices_off_zero = [i for i in indices.tolist() if signs[i]]
+            crossing = self.first_crossing(conditions, indices_off_zero, signs, left, right)
+            if crossing is not None:
+                return crossing
             signs = np.where(signs == 0, -np.sign(right.values), signs)
             left = right
         return None
@@ -399,35 +414,36 @@ class _Loop:
     def first_event(
         self, solver: Any, switch: tuple[int, float] | None
     ) -> tuple[int, float] | None:
-        """(event, time) of the first one that becomes true in the step, or the switch in it."""
-        if not len(self.truth):
+        """(event, time) of the first event in the last step before `switch`, else `switch`."""
+        if not len(self.is_true):
             return switch
-        between, n = self.between(solver), self.n_events
-        left = between.look(float(solver.t_old))
+        conditions, n = self.conditions(solver), self.n_events
+        left = conditions.look(float(solver.t_old))
         end = solver.t if switch is None else switch[1]
-        false = (left.values[:n] < 0) | ~self.truth
-        for place in solver.t_old + _LOOKS * (end - solver.t_old):
-            right = between.look(float(place))
-            found = self.first_of(between, np.flatnonzero(false).tolist(), np.ones(n), left, right)
-            if found is not None:
-                return found
-            left, false = right, right.values[:n] < 0
+        is_false = (left.values[:n] < 0) | ~self.is_true
+        for t in solver.t_old + _EVALUATION_POINTS * (end - solver.t_old):
+            right = conditions.look(float(t))
+            indices = np.flatnonzero(is_false).tolist()
+            crossing = self.first_crossing(conditions, indices, np.ones(n), left, right)
+            if crossing is not None:
+                return crossing
+            left, is_false = right, right.values[:n] < 0
         return switch
 
-    def between(self, solver: Any) -> Between:
+    def conditions(self, solver: Any) -> Between:
         """Conditions within the last step."""
         start, end = float(solver.t_old), float(solver.t)
         dense = solver.dense_output()
         return Between(self.system, self.watched, dense, start, end, self.unseen)
 
-    def first_of(
-        self, between: Between, numbers: list[int], signs: Array, left: Look, right: Look
+    def first_crossing(
+        self, conditions: Between, indices: list[int], signs: Array, left: Look, right: Look
     ) -> tuple[int, float] | None:
-        """(number, time) of the first of what is watched to become true between two looks."""
-        times = {i: between.first(i, float(signs[i]), left, right) for i in numbers}
-        found = [(time, i) for i, time in times.items() if time is not None]
-        self.unseen = between.unseen
-        return min(found)[::-1] if found else None
+        """(index, time) of the first of the given conditions to cross between left and right."""
+        times = {i: conditions.first(i, float(signs[i]), left, right) for i in indices}
+        crossings = [(time, i) for i, time in times.items() if time is not None]
+        self.unseen = conditions.unseen
+        return min(crossings)[::-1] if crossings else None
 
     # --- samples --------------------------------------------------------------------------------
 
@@ -439,10 +455,12 @@ class _Loop:
                 self.outputs.popleft()
         self.rows.append((t, np.array(y), np.array(self.system.scene.memory), 0))
 
-    def outputs_until(self, dense: Any, end: float, there: bool) -> None:
-        """Samples within a step, and at its end where an event is `there`; else that is settled
-        first."""
-        while self.outputs and (self.outputs[0] < end or (there and self.outputs[0] == end)):
+    def sample_outputs(self, dense: Any, end: float, include_end: bool) -> None:
+        """Store output times within a step, and at its end (an event) if `include_end`.
+
+        The end of a step without an event is stored later, after its projection.
+        """
+        while self.outputs and (self.outputs[0] < end or (include_end and self.outputs[0] == end)):
             t = self.outputs.popleft()
             self.rows.append((t, dense(t), np.array(self.system.scene.memory), 0))
 
@@ -458,24 +476,24 @@ class _Loop:
 
     def statistics(self) -> Statistics:
         return Statistics(
-            self.steps, 0, self.system.evaluations, self.fired,
+            self.steps, 0, self.system.evaluations, self.event_count,
             min(self.sizes, default=None), max(self.sizes, default=None),
             None, None, 0.0, 0.0, False, 0, self.crossings.count,
         )  # fmt: skip
 
 
-def _goes_on(solver: Any, closed: Array, atol: Array, rtol: float) -> bool:
-    """Whether an integrator goes on from `closed` (n,), the state of its last step with loops
-    closed; else another one is to begin there.
+def _accepts_projection(solver: Any, closed: Array, atol: Array, rtol: float) -> bool:
+    """True if a solver can continue from its projected last state `closed` (n,).
 
-    What is known of the rates where the step ends is kept: its error is of higher order.
+    Otherwise a new solver must start there.  The solver's rates at the end of the step remain:
+    their error is of higher order.
     """
     from scipy.integrate import BDF, DOP853, RK23, RK45, Radau
 
     if isinstance(solver, BDF):
         solver.D[0] = closed  # differences of order 0 are the state
     elif not isinstance(solver, DOP853 | RK23 | RK45 | Radau):
-        beside = np.abs(closed - solver.y) / (atol + rtol * np.abs(closed))
-        return float(beside.max(initial=0.0)) < _BESIDE
+        difference = np.abs(closed - solver.y) / (atol + rtol * np.abs(closed))
+        return float(difference.max(initial=0.0)) < _RESTART_DIFFERENCE
     solver.y = closed.copy()
     return True

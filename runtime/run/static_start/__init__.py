@@ -1,1 +1,1 @@
-"""Starts at rest: shapes of flexible bodies, and mechanisms on their way there."""
+"""Static starts: static deformations of flexible bodies, with and without closed loops."""

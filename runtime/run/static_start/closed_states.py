@@ -1,4 +1,4 @@
-"""A mechanism at one moment: its closed states, and small motions from one to the next."""
+"""Closed states of a mechanism at one time, and motions from one closed state to another."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from ..scene_system import SceneSystem
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
 
-#: Loops are followed in steps no longer than this, in sizes: longer ones may end where they are
-#: closed another way.
-_PART = 0.1
-#: Drift (m, rad) of what is to stay that is rounding, and most returns to its place.
-_STAYS, _RETURNS = 1e-13, 20
+#: Longest step of a motion relative to the characteristic scales: after a longer one the loops may
+#: close in another configuration.
+_MAX_STEP = 0.1
+#: Drift (m, rad) of fixed coordinates that counts as rounding, and largest number of corrections.
+_MAX_DRIFT, _MAX_CORRECTIONS = 1e-13, 20
 
 
 class ClosedStates:
-    """The closed states of a model at time t, `freedom` being its motions."""
+    """Closed states of a model at time t (s); `freedom` gives its independent speeds."""
 
     def __init__(self, model: CompiledScene, freedom: IndependentSpeeds, t: float) -> None:
         self.engine, self.freedom, self.t = model.looped, freedom, t
@@ -35,7 +35,10 @@ class ClosedStates:
         self._still = np.zeros(model.nu)
 
     def state(self, q: Array, u: Array | None = None) -> tuple[Array, Array]:
-        """(q, u) nearby with loops closed and without slips; from rest if no u is given."""
+        """Nearby state (q, u) that satisfies all constraints; u = 0 before projection by default.
+
+        Raises NumericalFailure where the loops do not close.
+        """
         try:
             y = self._scene.start(self.t, q, self._still if u is None else u)
         except SceneError as error:
@@ -43,45 +46,48 @@ class ClosedStates:
         return y[: self.engine.nq], y[self.engine.nq :]
 
     def accelerations(self, q: Array, u: Array, places: Sequence[int], follows: Array) -> Array:
-        """Those that loops and drives ask for (nu,) where some independent speeds have none."""
-        one = np.array([self.t]), q[None], u[None], self.memory[None]
-        found = self.engine.accelerations(*one)[1][0]
-        return np.asarray(found - follows @ found[list(places)])
+        """Accelerations (nu,) due to loops and drives with zero ones of the speeds `places`.
+
+        `follows` (nu, k) gives all speeds from these k independent ones.
+        """
+        state = np.array([self.t]), q[None], u[None], self.memory[None]
+        udot = self.engine.accelerations(*state)[1][0]
+        return np.asarray(udot - follows @ udot[list(places)])
 
     def moved(self, q: Array, places: Sequence[int], motion: Array) -> Array:
-        """q after a motion of independent speeds, loops closed again."""
-        longest = float(np.abs(motion / self.sizes[list(places)]).max(initial=0.0))
-        parts = max(1, int(np.ceil(longest / _PART)))
-        for _ in range(parts):
-            q = self._moved(q, places, motion / parts)
+        """q after a motion of the independent speeds `places`, with all loops closed."""
+        length = float(np.abs(motion / self.sizes[list(places)]).max(initial=0.0))
+        step_count = max(1, int(np.ceil(length / _MAX_STEP)))
+        for _ in range(step_count):
+            q = self._step(q, places, motion / step_count)
         return q
 
     def moved_beside(self, q: Array, places: Sequence[int], motion: Array, held: int) -> Array:
-        """The same, and the first `held` of these speeds have led nowhere else."""
+        """q after a motion that leaves the coordinates of the first `held` speeds unchanged."""
         start = q
         q = self.moved(q, places, motion)
-        for _ in range(_RETURNS):
+        for _ in range(_MAX_CORRECTIONS):
             drift = np.zeros(len(places))
-            drift[:held] = self._apart(start, q, places[:held])
-            if not np.abs(drift).max(initial=0.0) > _STAYS:
+            drift[:held] = self._motion_to(start, q, places[:held])
+            if not np.abs(drift).max(initial=0.0) > _MAX_DRIFT:
                 break
-            q = self._moved(q, places, drift)
+            q = self._step(q, places, drift)
         return q
 
-    def _moved(self, q: Array, places: Sequence[int], motion: Array) -> Array:
+    def _step(self, q: Array, places: Sequence[int], motion: Array) -> Array:
         follows = self.freedom.following(q, places)
         return self.state(self.freedom.moved(q, follows @ motion))[0]
 
-    def _apart(self, wanted: Array, q: Array, places: Sequence[int]) -> Array:
-        """The motion along some speeds that leads from q to what is wanted of these."""
+    def _motion_to(self, target: Array, q: Array, places: Sequence[int]) -> Array:
+        """Motion along the speeds `places` that moves their coordinates from q to `target`."""
         motion = np.zeros(len(self.sizes))
-        slots = {one.u: one for one in map(self.layout.hinge_of_speed, places)}
-        for one in slots.values():
-            missing = (wanted - q)[one.q_slice]
-            if not one.straight:
-                speeds = np.eye(len(motion))[one.u_slice]
+        slots_by_speed = {slots.u: slots for slots in map(self.layout.hinge_of_speed, places)}
+        for slots in slots_by_speed.values():
+            gap = (target - q)[slots.q_slice]
+            if not slots.straight:
+                speeds = np.eye(len(motion))[slots.u_slice]
                 rates = [self.engine.rates(self.t, q, speed, self.memory) for speed in speeds]
-                ways = np.array(rates)[:, one.q_slice].T
-                missing = np.asarray(np.linalg.lstsq(ways, missing, rcond=None)[0])
-            motion[one.u_slice] = missing
+                rate_matrix = np.array(rates)[:, slots.q_slice].T
+                gap = np.asarray(np.linalg.lstsq(rate_matrix, gap, rcond=None)[0])
+            motion[slots.u_slice] = gap
         return motion[list(places)]

@@ -1,4 +1,4 @@
-"""Flexible bodies that start in the static shape under the loads at t = 0."""
+"""Static deformation of flexible bodies under the loads at t = 0."""
 
 from __future__ import annotations
 
@@ -26,117 +26,122 @@ InverseDynamics = Callable[[Array, Array, Array], Array]
 
 _ACCURACY = 1e-10
 
-#: Rotation of a section, rad, that the kernels refuse.
-_LARGEST_TURN = 1.5
+#: Rotation of a section, rad, from which on the kernels reject a state.
+_MAX_ROTATION = 1.5
 
 
-def settle(
-    needed: InverseDynamics,
+def static_deformation(
+    inverse_dynamics: InverseDynamics,
     q: Array,
     u: Array,
     bodies: Mapping[str, ModalBody],
     slots: Mapping[str, HingeSlots],
 ) -> Array:
-    """q with the modal coordinates of `bodies` at rest: no modal speed, no modal acceleration.
+    """q with the modal coordinates of `bodies` in static equilibrium.
 
-    Hinges stay at their places and keep their speeds without acceleration (a spinning blade starts
-    stretched out); so the shape is that of bodies whose hinges are held.  Raises NumericalFailure
-    if there is no such shape nearby.
+    Modal speeds and accelerations are zero.  Hinges keep their coordinates and their speeds without
+    acceleration, so that a spinning blade starts stretched.  Raises NumericalFailure if there is no
+    equilibrium nearby.
     """
-    at_q = _places(slots[name].q_slice for name in bodies)
-    at_u = _places(slots[name].u_slice for name in bodies)
-    u, rest = u.copy(), np.zeros(len(u))
-    u[at_u] = 0.0
+    q_indices = _indices(slots[name].q_slice for name in bodies)
+    u_indices = _indices(slots[name].u_slice for name in bodies)
+    u, zero = u.copy(), np.zeros(len(u))
+    u[u_indices] = 0.0
 
-    def moved(q: Array, increment: Array) -> Array:
+    def advance(q: Array, increment: Array) -> Array:
         result = q.copy()
-        result[at_q] += increment
+        result[q_indices] += increment
         return result
 
-    sizes = np.concatenate([modal_sizes(body) for body in bodies.values()])
-    problem = Rest(lambda q: needed(q, u, rest)[at_u], moved, sizes)
-    return _settled(problem, q, bodies, slots)
+    scales = np.concatenate([modal_sizes(body) for body in bodies.values()])
+    problem = Rest(lambda q: inverse_dynamics(q, u, zero)[u_indices], advance, scales)
+    return _find_deformation(problem, q, bodies, slots)
 
 
-def settle_among_loops(
+def static_deformation_with_loops(
     model: CompiledScene,
     freedom: IndependentSpeeds,
     q: Array,
     u: Array,
     bodies: Mapping[str, ModalBody],
 ) -> tuple[Array, Array]:
-    """(q, u) near a closed state with the modal coordinates of `bodies` at rest, as in `settle`.
+    """(q, u) near a closed state with the modal coordinates of `bodies` in static equilibrium.
 
-    As many hinges stay at their places and keep their speeds as the mechanism has freedoms with
-    its shapes held, with the shapes of other bodies; the other hinges follow.
+    Like `static_deformation`, with closed loops: independent hinge speeds, as many as the mechanism
+    has with rigid bodies, keep their coordinates and speeds, as do the modes of other bodies; the
+    other hinges follow.
     """
     slots, closed = model.layout.modal, ClosedStates(model, freedom, 0.0)
-    shapes = _places(slots[name].u_slice for name in bodies).tolist()
-    held, own = freedom.settling(q, shapes, *_staying(model, u, bodies))
-    places, count = (*held, *own), len(held)
-    kept = np.append(u[list(held)], np.zeros(len(own)))
+    modal_speeds = _indices(slots[name].u_slice for name in bodies).tolist()
+    fixed, own = freedom.settling(q, modal_speeds, *_fixed_speeds(model, u, bodies))
+    independent, count = (*fixed, *own), len(fixed)
+    independent_u = np.append(u[list(fixed)], np.zeros(len(own)))
 
     def motion(q: Array) -> tuple[Array, Array, Array]:
-        """All speeds, and accelerations, where those that stay have none; and how all follow."""
-        follows, slipless = freedom.following(q, places), closed.state(q, u)[1]
-        speeds = slipless + follows @ (kept - slipless[list(places)])
-        speeds[list(places)] = kept
-        return speeds, closed.accelerations(q, speeds, places, follows), follows
+        """All speeds and accelerations for unaccelerated independent speeds, and the Jacobian."""
+        jacobian, projected_u = freedom.following(q, independent), closed.state(q, u)[1]
+        speeds = projected_u + jacobian @ (independent_u - projected_u[list(independent)])
+        speeds[list(independent)] = independent_u
+        return speeds, closed.accelerations(q, speeds, independent, jacobian), jacobian
 
-    def needed(q: Array) -> Array:
-        speeds, rates, follows = motion(q)
-        efforts = closed.engine.inverse_dynamics(0.0, q, speeds, rates, closed.memory)
-        return np.asarray(follows[:, count:].T @ efforts)
+    def modal_efforts(q: Array) -> Array:
+        speeds, udot, jacobian = motion(q)
+        efforts = closed.engine.inverse_dynamics(0.0, q, speeds, udot, closed.memory)
+        return np.asarray(jacobian[:, count:].T @ efforts)
 
-    def moved(q: Array, increment: Array) -> Array:
-        return closed.moved_beside(q, places, np.append(np.zeros(count), increment), count)
+    def advance(q: Array, increment: Array) -> Array:
+        return closed.moved_beside(q, independent, np.append(np.zeros(count), increment), count)
 
-    found = _settled(Rest(needed, moved, closed.sizes[list(own)], own), q, bodies, slots)
-    return found, motion(found)[0]
+    problem = Rest(modal_efforts, advance, closed.sizes[list(own)], own)
+    q = _find_deformation(problem, q, bodies, slots)
+    return q, motion(q)[0]
 
 
-def _staying(
+def _fixed_speeds(
     model: CompiledScene, u: Array, bodies: Mapping[str, ModalBody]
 ) -> tuple[list[int], ...]:
-    """Speeds that are to stay where the shapes of `bodies` settle: of hinges that the scene holds
-    and of the shapes of other bodies; and those that stay rather than others, being given."""
+    """Speeds to keep while `bodies` deform, and speeds to keep in preference to others.
+
+    The former belong to hinges with `hold` and to the modes of other bodies, the latter to hinges
+    with a given speed.
+    """
     layout, free = model.layout, set(model.free_speeds)
-    tables = [one for one in model.packed.described.hinge if one.hold]
-    kept = [slots.u_slice for name, slots in layout.modal.items() if name not in bodies]
-    kept += [layout.hinges[one.name].u_slice for one in tables]
+    slices = [slots.u_slice for name, slots in layout.modal.items() if name not in bodies]
+    slices += [layout.hinges[h.name].u_slice for h in model.packed.described.hinge if h.hold]
     fast = [] if model.closed is None else model.closed.fast
-    wished = [layout.hinges[name].u_slice for name in fast]
-    chosen = [k for k in _places(kept).tolist() if k in free]
-    return chosen, [k for k in _places(wished).tolist() if k in free - {*chosen} and u[k]]
+    preferred = _indices(layout.hinges[name].u_slice for name in fast).tolist()
+    fixed = [k for k in _indices(slices).tolist() if k in free]
+    return fixed, [k for k in preferred if k in free - {*fixed} and u[k]]
 
 
-def _places(slices: Iterable[slice]) -> NDArray[np.int64]:
+def _indices(slices: Iterable[slice]) -> NDArray[np.int64]:
     return np.concatenate([np.zeros(0, np.int64), *(np.arange(s.start, s.stop) for s in slices)])
 
 
-def _settled(
+def _find_deformation(
     problem: Rest, q: Array, bodies: Mapping[str, ModalBody], slots: Mapping[str, HingeSlots]
 ) -> Array:
     try:
-        found = find_determined_equilibrium(problem, q, _ACCURACY)
+        q = find_determined_equilibrium(problem, q, _ACCURACY)
     except (Unsettled, Undetermined) as failure:
         names = ", ".join(f'"{name}"' for name in bodies)
-        where = "are at the edge of" if isinstance(failure, Undetermined) else "may be beyond"
+        is_critical = isinstance(failure, Undetermined)
+        load = "are at the buckling load" if is_critical else "may exceed the buckling load"
         raise NumericalFailure(
-            f"no static shape of {names} found under the loads at t = 0; they {where} buckling; "
+            f"{names}: no static deformation found under the loads at t = 0, which {load}; "
             "start undeformed or give eta"
         ) from None
     for name, body in bodies.items():
-        _refuse_turned(body, found[slots[name].q_slice])
-    return found
+        _check_rotation(body, q[slots[name].q_slice])
+    return q
 
 
-def _refuse_turned(body: ModalBody, eta: Array) -> None:
-    """NumericalFailure for a shape in which an end turns further than the model knows."""
-    turned = max(float(np.linalg.norm(port.theta @ eta)) for port in body.ports.values())
-    if turned > _LARGEST_TURN:
+def _check_rotation(body: ModalBody, eta: Array) -> None:
+    """Raise NumericalFailure for a deformation that rotates an end beyond the model's range."""
+    rotation = max(float(np.linalg.norm(port.theta @ eta)) for port in body.ports.values())
+    if rotation > _MAX_ROTATION:
         raise NumericalFailure(
-            f'the static shape of "{body.name}" under the loads at t = 0 turns an end by '
-            f"{turned:.2g} rad against its frame, far beyond small deflections; check the "
-            "stiffness, split the body into several that are welded together, or start undeformed"
+            f'"{body.name}": the static deformation under the loads at t = 0 rotates an end by '
+            f"{rotation:.2g} rad relative to its frame, expected at most {_MAX_ROTATION:g}; check "
+            "the stiffness, split the body into several welded ones, or start undeformed"
         )

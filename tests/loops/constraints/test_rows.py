@@ -148,7 +148,7 @@ def test_a_disc_that_falls_flat() -> None:
     assert not batch.success[0] and batch.messages[0].startswith(
         "the state cannot be accepted at t"
     )
-    assert "simulate this one alone to learn the cause" in batch.messages[0]
+    assert "simulate this trajectory alone to find the cause" in batch.messages[0]
 
 
 # --- a bead on a wire, a governor -----------------------------------------------------------------
