@@ -19,6 +19,12 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..run.trajectory import Trajectory
 
+#: Name and remedy of the risk of redundant rows that are violated.
+MISFIT_RISK = "nearly-redundant"
+MISFIT_REMEDY = (
+    "make the axes and lengths of the loop agree, with more digits, or model its compliance by a "
+    "bushing or a flexible body"
+)
 #: Maximum numbers of checked samples and of named rows.
 _MAX_SAMPLES, _MAX_NAMED_ROWS = 12, 8
 #: Gaps of redundant rows over those of independent rows, from which on the geometry has them.

@@ -10,10 +10,9 @@ from mstmm.array_validation import Array
 from mstmm.risk import RUN, Risk
 
 from ..integrate.achieved_error import AchievedError
-from ..risk_checks.loop_misfit import MISFIT_REMEDY, MISFIT_RISK
 from ..run.trajectory import Trajectory
 from .certificate_data import Drift
-from .loop_closure_error import Closure
+from .loop_closure_error import MISFIT_REMEDY, MISFIT_RISK, Closure
 from .step_control import StepControl
 
 #: Distance of a quaternion's length from 1 that is a risk.

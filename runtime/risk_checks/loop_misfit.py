@@ -8,16 +8,11 @@ from typing import TYPE_CHECKING
 from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
+from ..result.loop_closure_error import MISFIT_REMEDY, MISFIT_RISK
+
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..integrate.settings import Settings
-
-#: Name of the finding, and what helps.
-MISFIT_RISK = "nearly-redundant"
-MISFIT_REMEDY = (
-    "make the axes and lengths of the loop agree, with more digits, or model its compliance by a "
-    "bushing or a flexible body"
-)
 
 
 def applies_to(model: CompiledScene) -> bool:
