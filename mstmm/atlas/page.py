@@ -9,11 +9,11 @@ from .case_result import CaseResult
 INTRODUCTION = """\
 # Failure atlas: limits of numerical methods
 
-Atlas of failures, written by `mstmm stability --out DIR`. Every frontier is measured in that run,
-by a coarse grid and bisection. A method *fails* where its error measure exceeds the limit, or where
-there is no answer. Arrows at the upper edge of a plot mean no answer, or one far beyond the axis.
-"tried to" marks the end of the range that was measured for a method. "(end)" means that the remedy
-holds over the whole range that was measured.
+Find out where a numerical method fails, and what works there. `mstmm stability --out DIR` writes
+this page and measures every limit by a coarse grid and bisection. A method *fails* where its error
+measure exceeds the limit, or where there is no result. Arrows at the upper edge of a plot mean no
+result, or one far beyond the axis. "tried to" is the end of the measured range of a method. "(end)"
+means that the remedy holds over the whole measured range.
 """
 
 _HEADINGS = ("case", "parameter", "measured", "limit", "fails", "remedy", "holds to")

@@ -65,7 +65,7 @@ def test_a_model_keeps_its_numbers_and_what_was_asked(sweep: str) -> None:
 def test_a_session_says_what_to_pickle_instead() -> None:
     model = mstmm.compile(pins(1, [0.3]))
     session = model.session(method="rk4", step=0.01)
-    with pytest.raises(mstmm.SceneError, match=r"keep its model, t and state"):
+    with pytest.raises(mstmm.SceneError, match=r"pickle model, t and state"):
         pickle.dumps(session)
     session.advance(0.1)
     again = pickle.loads(pickle.dumps(model)).session(*session.state, session.t, "rk4", 0.01)

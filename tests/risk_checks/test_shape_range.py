@@ -89,7 +89,7 @@ def test_motions_that_shapes_have_too_high_are_doubted() -> None:
     requested = model.linearize().modes(4)
     assert requested.omega[3] > 1.05 * 10.9955**2
     (risk,) = (risk for risk in requested.risks if risk.name == "frequency-range")
-    assert risk.doubt and "a motion from" in risk.means
+    assert risk.doubt and "a mode from" in risk.means
     assert model.linearize().modes(3).trusted
 
 

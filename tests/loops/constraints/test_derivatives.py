@@ -68,7 +68,9 @@ def test_by_numbers_of_constraints() -> None:
              for s in (STEP, -STEP)]  # fmt: skip
     assert np.abs(found).max() > 1.0
     assert worst(found, (sides[0] - sides[1]) / (2 * STEP)) < 1e-7
-    with pytest.raises(mstmm.SceneError, match=r'"road.normal\[0\]": .* begin it have no exact'):
+    with pytest.raises(
+        mstmm.SceneError, match=r'"road.normal\[0\]": .* start of a constraint, have no exact'
+    ):
         model.derivatives(q, u, parameters=["road.normal[0]"])
 
 
