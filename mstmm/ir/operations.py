@@ -2,8 +2,8 @@
 
 C, the tape, numpy, SymPy, the listing, folding, differentiation, expressions and the passes over
 fused code read this table.  A new operation needs a row here, a function in each of the C texts
-`fused_scalar_type.c` and `fused_lanes.c`, and an entry in `derive.audit.arithmetic` if mpmath
-computes it in another way.
+`fused_scalar_type.c` and `fused_lanes.c`, and an entry in derive/verification/mpmath_arithmetic.py
+if mpmath computes it in another way.
 """
 
 from __future__ import annotations

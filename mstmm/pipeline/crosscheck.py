@@ -1,10 +1,10 @@
 """Cross-check of the kernels of an element in three forms, and of statements of mechanics.
 
-The three forms are the stated equations at 50 digits (`derive.audit.evaluate_equations`), the IR at
-50 digits, and the compiled C in doubles (where there is no C, the engine's interpreter).  The error
-of C must not exceed the rounding bound of a running error analysis.  They are compared at random
-points, and at points where a formula could fail.  `derive.audit.properties` has the statements of
-mechanics.
+The three forms are the stated equations at 50 digits (derive/verification/equation_evaluation.py),
+the IR at 50 digits, and the compiled C in doubles (where there is no C, the engine's interpreter).
+The error of C must not exceed the rounding bound of a running error analysis.  They are compared at
+random points, and at points where a formula could fail.  The statements of mechanics are in
+derive/verification/mechanics_checks.py.
 
     report = mstmm.pipeline.crosscheck.crosscheck("hinge", "pin")
     print(report); report.passed
