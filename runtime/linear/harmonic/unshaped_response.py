@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 from mstmm.errors import MstmmError
-from mstmm.risk import Risk
+from mstmm.risk import Risk, information
 
 from ...packing.scene_parameters import scene_data, scene_from_data
 from ...result.flexible.unshaped_directions import unshaped_directions
@@ -61,7 +61,12 @@ def unshaped_response_risks(
         fuller = _with_shapes(linear, inputs, lacking)
         given, _ = response(linear, inputs, omega[picked])
         expected, rounding = response(fuller, fuller.controls, omega[picked])
-    except MstmmError:  # an undamped resonance, or a scene that is refused with these shapes
+    except MstmmError as failure:  # an undamped resonance, or a scene that is rejected with them
+        yield information(
+            "unexamined", "the response",
+            f"not examined for directions of beams without shapes: {failure}",
+            "add shapes in these directions, or compare with a simulation",
+        )  # fmt: skip
         return
     size = np.maximum(np.abs(given), np.abs(expected)).max(axis=0)
     change = np.abs(given - expected).max(axis=0)
