@@ -1,4 +1,4 @@
-"""The linear equations of a scene about a state: matrices in parts, and pushes, with names."""
+"""Linear equations of motion about a state: matrices with their parts, inputs and names."""
 
 from __future__ import annotations
 
@@ -35,29 +35,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class LinearEquations(AssessedAnswer):
-    """M x'' + C x' + K x = V v + W w of motions x near a state of a scene, SI units.
+    """M x'' + C x' + K x = V v + W w for perturbations x about a state of a scene, SI units.
 
-    x (n,) are tangent increments of the coordinates that nobody imposes: dq = N(q) x where
-    qdot = N(q) u, which of most hinges and of shapes are the coordinates themselves and of balls
-    rotation vectors in outboard axes.  Rows are N, N*m; v and w are efforts, forces and moments
-    beyond those of the state, accelerations of the ground, and accelerations d'' of drives; with
-    these M x'' + C x' + K x + C_driven d' + K_driven d = V v + W w.
+    x (n,) are tangent increments of the coordinates without prescribed motion: dq = N(q) x where
+    qdot = N(q) u.  For most hinges and for modal coordinates they are increments of the coordinates
+    themselves, for ball hinges rotation vectors in outboard axes.  Rows are in N or N*m; v and w
+    are efforts, forces and moments in addition to those of the state, accelerations of the ground,
+    and accelerations d'' of drives.  With drives,
+    M x'' + C x' + K x + C_driven d' + K_driven d = V v + W w.
 
     Attributes:
-        model: whose motion it is.
-        state: t (s), q (nq,), u (nu,) and a (nu,), the accelerations there.
-        controls, others: where v and w push.
-        turning: (n, n) G of x' = G x + du, how increments of coordinates that are no integrals of
-            speeds go along with the motion; None where they do not.
-        about: the state by code compiled for the scene, where there is such code.
-        mechanism: how closed loops let the scene move there: x are independent motions then; None
+        model: the compiled scene.
+        state: operating point: t (s), q (nq,), u (nu,) and accelerations a (nu,).
+        controls, others: channels of v and w.
+        turning: (n, n) G of x' = G x + du, for coordinates that are not integrals of speeds; None
+            where x' = du.
+        about: linearisation by code compiled for the scene; None without such code.
+        mechanism: reduction of closed loops to independent speeds, to which x belong then; None
             for a tree.
-        dry: friction of hinges that rest at the state, which is left out or counts as viscous
-            damping; None where all of it is as the laws have it.
-        carrying: the transformation of increments of a spinning rotor to the fixed frame; None
-            where x are those of the coordinates themselves.
-        at_speeds: gives the equations at q with speeds (nu,), where the state was looked for at
-            rest because none was given; else None.
+        dry: friction of hinges that do not slide at the state, left out or replaced by viscous
+            damping; None where the laws keep all friction.
+        carrying: transformation of the increments of a spinning rotor to the fixed frame; None
+            where x are increments of the coordinates themselves.
+        at_speeds: function that returns the equations at q with given speeds (nu,), if the
+            operating point was sought at rest because no state was given; else None.
     """
 
     model: CompiledScene
@@ -82,12 +83,12 @@ class LinearEquations(AssessedAnswer):
 
     @property
     def free(self) -> tuple[int, ...]:
-        """Places of x among the speeds."""
+        """Indices of the speeds that x belongs to."""
         return self.model.free_speeds if self.mechanism is None else self.mechanism.places
 
     @property
     def tree(self) -> LoopedEngine:
-        """The scene, its loops torn open, with dry friction as the model has it."""
+        """Engine of the spanning tree, with dry friction as in the linear model."""
         if self.mechanism is not None:
             return self.mechanism.tree
         return self._smooth if self.dry else self.model.looped
@@ -99,7 +100,7 @@ class LinearEquations(AssessedAnswer):
 
     @cached_property
     def _named(self) -> list[tuple[str, str]]:
-        """Name and unit of x."""
+        """Names and units of x."""
         known = dict(zip(self.model.free_speeds, self.model.increments, strict=True))
         return [known[place] for place in self.free]
 
@@ -132,14 +133,16 @@ class LinearEquations(AssessedAnswer):
         return self._second_order(self._of(standing(self.tree, self.state)))
 
     def _of(self, engine: LoopedEngine) -> Matrices:
-        """Of the scene's tree, or of it with other elements, along x."""
+        """Matrices along x of the spanning tree, or of a variant with other elements."""
         if self.mechanism is not None:
             return self.mechanism.matrices(engine, self.state)
         return matrices(engine, self.state, list(self.free))
 
     def _second_order(self, found: Matrices) -> Matrices:
-        """From speeds to x': where x' = G x + du, C du = C x' - C G x and M da = M x'' - M G x';
-        then to the fixed frame."""
+        """Transform from speeds to x' and to the fixed frame.
+
+        From x' = G x + du: C du = C x' - C G x and M da = M x'' - M G x'.
+        """
         g = self.turning
         if g is not None:
             found = Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
@@ -147,54 +150,57 @@ class LinearEquations(AssessedAnswer):
 
     @property
     def has_stiffness(self) -> bool:
-        """Whether there is a K."""
+        """Whether the model has a stiffness matrix K."""
         return True
 
     @property
     def M(self) -> Array:
-        """(n, n) mass matrix."""
+        """Mass matrix (n, n)."""
         return self._whole.M
 
     @property
     def C(self) -> Array:
-        """(n, n): `damping` and `gyroscopic`."""
+        """Matrix (n, n) of x': `damping` + `gyroscopic`."""
         return self._whole.C
 
     @property
     def K(self) -> Array:
-        """(n, n): `elastic`, `geometric` and `load`."""
+        """Stiffness matrix (n, n): `elastic` + `geometric` + `load`."""
         return self._whole.K
 
     @cached_property
     def damping(self) -> Array:
-        """(n, n) of C: what laws, shapes and loads resist to speeds."""
+        """Damping part (n, n) of C: from laws, flexible bodies and loads."""
         return self.C - self._standing.C + self._of_shapes(lambda body: body.D)
 
     @property
     def gyroscopic(self) -> Array:
-        """(n, n) of C: inertia forces of the motion that there is; zero at rest."""
+        """Gyroscopic part (n, n) of C: inertia forces of the motion at the state; zero at rest."""
         return self.C - self.damping
 
     @cached_property
     def elastic(self) -> Array:
-        """(n, n) of K: slopes of the laws of hinges and springs, and the stiffness of shapes."""
+        """Elastic part (n, n) of K: from hinge laws, springs and flexible bodies."""
         return self.K - self._held.K + self._of_shapes(lambda body: body.K)
 
     @cached_property
     def sprung(self) -> Array:
-        """(n, n) of `elastic`: slopes of the laws of springs between ends."""
+        """Part (n, n) of `elastic` from springs between ends."""
         lawless = self._second_order(self._of(without_laws(self.tree)))
         return lawless.K - self._held.K
 
     @property
     def load(self) -> Array:
-        """(n, n) of K: what loads do that go along with a body or follow an expression."""
+        """Load stiffness (n, n) in K: from loads in body axes and loads by expressions."""
         return self._held.K - self._standing.K
 
     @property
     def geometric(self) -> Array:
-        """(n, n) of K: gravity, inertia forces, and standing loads and tensions, on a scene that
-        is displaced."""
+        """Geometric stiffness (n, n) in K.
+
+        It stems from gravity, inertia forces and constant loads and tensions on the displaced
+        scene.
+        """
         return self._standing.K - self._of_shapes(lambda body: body.K)
 
     @property
@@ -209,18 +215,18 @@ class LinearEquations(AssessedAnswer):
 
     @property
     def drives(self) -> tuple[int, ...]:
-        """Places among the speeds of the drives whose motions are inputs or disturbances."""
+        """Speed indices of the drives whose motions are inputs or disturbances."""
         moved = [one.moves for one in (*self.controls, *self.others) if one.moves]
         return tuple(dict.fromkeys(speed for one in moved for speed, _ in one)) if moved else ()
 
     @property
     def driven(self) -> tuple[str, ...]:
-        """Names of d, the coordinates of these drives beside the state."""
+        """Names of d, the increments of the coordinates of these drives."""
         return tuple(coordinate(self.model, speed) for speed in self.drives)
 
     @cached_property
     def _moved(self) -> tuple[Array, Array]:
-        """K_driven and C_driven."""
+        """Matrices K_driven and C_driven, each (n, drives)."""
         if self.drives and self.carrying is not None:
             raise SceneError(
                 "fixed frame: motions of drives are not inputs there; leave them out, or push by "
@@ -232,7 +238,7 @@ class LinearEquations(AssessedAnswer):
         return wide[:, 0].T, wide[:, 1].T
 
     def driving(self, moves: Moves) -> Columns:
-        """(n,): what drives that go along with one motion ask for."""
+        """Columns (n,) of drives that follow one common motion."""
         if self.mechanism is not None:
             return self.mechanism.driven(self.state, moves)
         wide = columns_of(self.model.looped, self.state, moves)
@@ -240,26 +246,26 @@ class LinearEquations(AssessedAnswer):
 
     @property
     def C_driven(self) -> Array:
-        """(n, drives): what d' adds on the left, C_driven d'."""
+        """Matrix (n, drives) of d' on the left-hand side."""
         return self._moved[1]
 
     @property
     def K_driven(self) -> Array:
-        """(n, drives): what d adds on the left, K_driven d."""
+        """Matrix (n, drives) of d on the left-hand side."""
         return self._moved[0]
 
     @cached_property
     def V(self) -> Array:
-        """(n, inputs): what a unit of each input does."""
+        """Efforts (n, inputs) per unit of each input."""
         return self.pushed(self.controls)
 
     @cached_property
     def W(self) -> Array:
-        """(n, disturbances): what a unit of each disturbance does."""
+        """Efforts (n, disturbances) per unit of each disturbance."""
         return self.pushed(self.others)
 
     def pushed(self, channels: Sequence[Channel]) -> Array:
-        """(n, channels): what a unit of each push does."""
+        """Efforts (n, channels) per unit of each channel."""
         if self.mechanism is None:
             found = columns(self.tree, self.state, channels, list(self.free))
         else:
@@ -267,7 +273,7 @@ class LinearEquations(AssessedAnswer):
         return found if self.carrying is None else self.carrying.pushed(found)
 
     def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
-        """A matrix of the flexible bodies in its place among all."""
+        """Matrix (n, n) assembled from a matrix of each flexible body."""
         found = np.zeros((self.model.nu, self.model.nu))
         for name, slots in self.model.layout.modal.items():
             found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible[name])
@@ -276,17 +282,17 @@ class LinearEquations(AssessedAnswer):
         return found[np.ix_(self.free, self.free)]
 
     def symbolic(self, keep: Sequence[str]) -> SymbolicLinearModel:
-        """The same M, C, K, V and W as SymPy expressions in names that are kept: numbers of the
-        scene as in `with_parameters` ("rod1.mass", "gravity[1]"), and coordinates and speeds of
-        hinges ("shoulder.angle").
+        """M, C, K, V and W as SymPy expressions in the names `keep`.
 
-        The schedule that makes the numbers is run on symbols.  What is not kept goes in as the
-        number that it is, as a fraction where that is a short decimal: the state and its
-        accelerations too, so that an equilibrium that depends on kept numbers stays where it is,
-        and a law that changes its branch keeps the one that it has there.
+        `keep` are parameters of the scene as in `with_parameters` ("rod1.mass", "gravity[1]"), and
+        coordinates and speeds of hinges ("shoulder.angle").
 
-        Raises SceneError for a name that is none of these, for numbers of flexible bodies, and for
-        scenes and expressions that are too large.
+        The numeric schedule is evaluated on symbols.  All other values are inserted as numbers,
+        short decimals as fractions.  This includes the state and its accelerations: an equilibrium
+        does not follow the kept parameters, and a piecewise law keeps its branch at the state.
+
+        Raises SceneError for unknown names, for parameters of flexible bodies, and for scenes and
+        expressions that are too large.
         """
         if self.carrying is not None:
             raise SceneError(
@@ -303,11 +309,11 @@ class LinearEquations(AssessedAnswer):
 
     @cached_property
     def pencil(self) -> Pencil:
-        """M, C and K as operators, O(bodies), without the matrices; of states of trees at rest."""
+        """M, C and K as O(bodies) operators without matrices, for trees at rest."""
         return Pencil(self.tree, self.state, list(self.free))
 
     def spread(self, x: NDArray[Any]) -> NDArray[Any]:
-        """(nu, ...) increments along all speeds of those of x (n, ...)."""
+        """Increments (nu, ...) along all speeds for x (n, ...)."""
         if self.carrying is not None:
             x = np.linalg.solve(self.carrying.turned, x)
         if self.mechanism is not None:
@@ -317,7 +323,7 @@ class LinearEquations(AssessedAnswer):
         return found
 
     def displaced(self, x: Array) -> Array:
-        """q (nq,) of the state after increments x (n,)."""
+        """Coordinates q (nq,) of the state displaced by increments x (n,)."""
         model, speeds = self.model, self.spread(x)
         engine, state = model.looped, self.state
         moved = state.q + engine.rates(state.t, state.q, speeds, engine.start_memory())

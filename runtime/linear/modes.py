@@ -1,4 +1,4 @@
-"""Natural motions of a linear model: frequencies, damping, shapes, and what carries them."""
+"""Normal modes of a linear model: frequencies, damping, shapes and energy shares."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from ..result.scene3d.view import SceneView
     from .linear_equations import LinearEquations
 
-#: Shapes in a picture unless others are asked for.
+#: Default number of shapes in a figure.
 _PANELS = 6
-#: Names of the risks of single inputs, and of single outputs; motions have neither.
+#: Names of the risks of single inputs and outputs; modes have neither.
 INPUT_RISKS, OUTPUT_LEFT_OUT = ("changing-input", "input-without-effect"), "output-left-out"
 CHANNEL_RISKS = (*INPUT_RISKS, OUTPUT_LEFT_OUT)
 
@@ -37,15 +37,15 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class Modes(AssessedAnswer):
-    """k motions x(t) = Re(shape exp(eigenvalue t)) near a state, by rising omega.
+    """k modes x(t) = Re(shape exp(eigenvalue t)) about an operating point, by ascending omega.
 
     Attributes:
         linear: the linear model.
-        eigenvalues: (k,) complex, 1/s; of a pair the one with positive imaginary part.
-        shapes: (n, k), real with unit modal mass where there is neither damping nor gyroscopic
-            load, else complex with the largest entry 1.
-        complete: whether no mode below the last one is missing; None where that is not counted.
-        count: number of modes that was asked for; None if all were.
+        eigenvalues: (k,) complex, 1/s; of a conjugate pair the one with positive imaginary part.
+        shapes: (n, k), real with unit modal mass without damping and gyroscopic terms, else complex
+            with the largest entry 1.
+        complete: whether no mode below the last one is missing; None if not counted.
+        count: requested number of modes; None for all.
     """
 
     linear: LinearEquations = field(repr=False)
@@ -65,17 +65,20 @@ class Modes(AssessedAnswer):
 
     @property
     def findings(self) -> Iterator[Risk]:  # type: ignore[override]
-        """Risks of the linear model but for those of its inputs and outputs, motions that grow or
-        are free, and such beyond the shapes."""
+        """Risks of the modes.
+
+        They are those of the linear model except of its inputs and outputs, unstable and
+        unrestrained modes, and modes above the frequency limit of the shape functions.
+        """
         yield from (risk for risk in self.linear.risks if risk.name not in CHANNEL_RISKS)
         yield from self.motion_risks()
         yield from self._range_risks()
 
     def _range_risks(self) -> Iterator[Risk]:
-        """Modes above the frequency up to which the shapes of flexible bodies hold.
+        """Risks of modes above the frequency limit of the shape functions of flexible bodies.
 
-        They are an objection if they were asked for by a count, or if no vibration is below it;
-        of all modes the highest are never accurate.
+        They are objections if a number of modes was requested, or if no vibration is below the
+        limit: among all modes, the highest are never accurate.
         """
         limit = min(shape_limits(self.linear.model).values(), default=np.inf)
         fast = np.flatnonzero(self.omega > limit)
@@ -90,7 +93,7 @@ class Modes(AssessedAnswer):
         return motion_range_risks(self.linear.model, some.omega, some.strain())
 
     def motion_risks(self) -> Iterator[Risk]:
-        """Motions that grow, and motions that nothing pushes back."""
+        """Risks of unstable and unrestrained modes."""
         growing = self.eigenvalues.real.max(initial=0)
         if growing > 0:
             k = int(self.eigenvalues.real.argmax())
@@ -110,39 +113,41 @@ class Modes(AssessedAnswer):
 
     @cached_property
     def frame(self) -> str:
-        """The frame of the frequencies, "fixed" or "rotating"; see `Linear.frame`."""
+        """Frame of the frequencies, "fixed" or "rotating"; see `Linear.frame`."""
         return frame_of(self.linear)
 
     @cached_property
     def whirl(self) -> Array:
-        """(k,) sense of each motion about the axis of the fastest spin, as its frame sees it: 1
-        forward along circles, -1 backward, between these along ellipses, 0 in a plane."""
+        """Whirl direction (k,) of each mode about the axis of the fastest spin, in its frame.
+
+        1 is forward and -1 backward on circles, values between are ellipses, 0 is in a plane.
+        """
         return whirl(self.linear, self.shapes)
 
     @property
     def omega(self) -> Array:
-        """(k,) |eigenvalue|, rad/s: of undamped motion its angular frequency."""
+        """|eigenvalue| (k,) in rad/s: the angular frequency if undamped."""
         return np.abs(self.eigenvalues)
 
     @property
     def frequency(self) -> Array:
-        """(k,) frequency of the oscillation in Hz, 0 of what does not oscillate."""
+        """Frequency (k,) of the oscillation in Hz; 0 without oscillation."""
         return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
     @property
     def damping(self) -> Array:
-        """(k,) in parts of the critical one; negative of what grows, 0 of what moves freely."""
+        """Damping ratio (k,); negative for unstable modes, 0 for rigid-body modes."""
         omega = self.omega
         rates = 0.0 - self.eigenvalues.real
         return np.divide(rates, omega, out=np.zeros_like(omega), where=omega > 0)
 
     def first(self, count: int) -> Modes:
-        """The first of them."""
+        """The first `count` modes."""
         return replace(self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count])
 
     @cached_property
     def _units(self) -> Array:
-        """(k,) modal masses x* M x of the shapes."""
+        """Modal masses (k,), x* M x, of the shapes."""
         linear, x = self.linear, self.shapes
         loops = linear.mechanism is not None
         moved = linear.M @ x if loops else energy_shares.along(linear.pencil.mass, x)
@@ -150,37 +155,45 @@ class Modes(AssessedAnswer):
 
     @cached_property
     def _lengths(self) -> Array:
-        """(n,) what a unit of each coordinate counts beside others: m, of rad as a length."""
+        """Weights (n,) to compare coordinates: 1 for m, the scene length for rad."""
         turns = [unit == "rad" for unit in self.linear.units]
         return np.where(turns, scene_length(self.linear.model), 1.0)
 
     @cached_property
     def participation(self) -> NDArray[Any]:
-        """(k, disturbances): how much of each shape a unit of each disturbance excites, x* W over
-        the modal mass; of accelerations of the ground the participation factors, with their sign
-        turned."""
+        """Modal excitation (k, disturbances) per unit of each disturbance: x* W / modal mass.
+
+        For accelerations of the ground these are the participation factors with opposite sign.
+        """
         pushed = np.conj(self.shapes).T @ self.linear.W
         return np.asarray(pushed / self._units[:, None])
 
     @property
     def effective_mass(self) -> Array:
-        """(k, disturbances) in kg for accelerations of the ground: |x* W|^2 over the modal mass.
-        Over all undamped modes of a scene it adds up to the mass that moves."""
+        """Effective modal mass (k, disturbances): |x* W|^2 / modal mass.
+
+        It is in kg for accelerations of the ground; the sum over all undamped modes of a scene is
+        the moving mass.
+        """
         return np.asarray(np.abs(self.participation) ** 2 * self._units[:, None])
 
     def kinetic(self) -> dict[str, Array]:
-        """Body -> (k,): its part of the kinetic energy of each shape, x* M x; the rotors of a hinge
-        move with its outboard body."""
+        """Share (k,) of each body in the kinetic energy x* M x of each shape.
+
+        The rotors of a hinge count with its outboard body.
+        """
         return energy_shares.kinetic(self.linear, self.shapes)
 
     def strain(self) -> dict[str, Array]:
-        """Owner -> (k,): its part of the elastic energy of each shape: hinges with their laws,
-        flexible bodies, and "springs", all of them together, where there are any.  nan where a
-        shape strains nothing."""
+        """Share (k,) of each owner in the elastic energy of each shape.
+
+        Owners are hinges with laws, flexible bodies, and "springs" for all springs together, if
+        there are any.  nan for a shape without elastic energy.
+        """
         return energy_shares.strain(self.linear, self.shapes)
 
     def displaced(self, k: int, amplitude: float) -> Array:
-        """q (nq,) of the state moved by `amplitude` times the real part of shape k."""
+        """Coordinates q (nq,) of the state displaced by `amplitude` times Re(shape k)."""
         return self.linear.displaced(finite_float("amplitude", amplitude) * np.real(self._shape(k)))
 
     def _shape(self, k: int) -> NDArray[Any]:
@@ -189,9 +202,9 @@ class Modes(AssessedAnswer):
         return self.shapes[:, k]
 
     def moving(self, k: int) -> list[str]:
-        """Coordinates that move most in shape k, a tenth of the largest and more, largest first.
+        """Dominant coordinates of mode k: at least a tenth of the largest, largest first.
 
-        A radian counts as a length of the scene.
+        A radian counts as one length of the scene.
         """
         size = np.abs(self._shape(k)) * self._lengths
         places = np.flatnonzero(size > 0.1 * size.max(initial=0))
@@ -199,7 +212,7 @@ class Modes(AssessedAnswer):
         return [self.linear.coordinates[j] for j in order]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, for JSON; of shapes a row for each."""
+        """All data as a dictionary for JSON; one row per shape."""
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "damping": self.damping.tolist(), "complete": self.complete,
@@ -215,7 +228,7 @@ class Modes(AssessedAnswer):
         }  # fmt: skip
 
     def to_dataset(self) -> Any:
-        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
         kinetic, strain = self.kinetic(), self.strain()
         arrays: dict[str, Any] = {
             "omega": ("mode", self.omega, {"units": "rad/s"}),
@@ -236,7 +249,7 @@ class Modes(AssessedAnswer):
         return file_formats.xarray().Dataset(arrays, names, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        """A row for each motion."""
+        """Header, then one row per mode."""
         parts = [np.real] if self.undamped else [np.real, np.imag]
         named = [name + " imaginary" * (part is np.imag) for part in parts
                  for name in self.linear.coordinates]  # fmt: skip
@@ -250,20 +263,22 @@ class Modes(AssessedAnswer):
             yield str(k + 1), *(repr(float(x)) for x in numbers)
 
     def save(self, path: str | Path) -> Path:
-        """Frequencies, damping, shapes and shares of energy: .nc (extra io) or .csv, a row for each
-        motion.
+        """Save frequencies, damping, shapes and energy shares: .nc (extra io) or .csv.
 
-        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        The .csv file has one row per mode.
+
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
         return file_formats.save(path, self.to_dataset, self._rows())
 
     def plot(self, path: str | Path | None = None, which: Sequence[int] | None = None) -> Any:
-        """`matplotlib.figure.Figure`: the scene at rest and displaced by the real part of each
-        shape of `which`, counted from 0, the first six unless given, in the coordinate plane that
-        shows most of it; written to `path` where it is given.
+        """Mode shapes as a `matplotlib.figure.Figure`, written to `path` if given.
 
-        Raises SceneError for a shape that is not there, EnvironmentFailure without the extra
-        `plot`.
+        It shows the scene at the state and displaced by the real part of each shape of `which`
+        (indices from 0, by default the first six), in the coordinate plane with the largest view of
+        the motion.
+
+        Raises SceneError for an unknown shape, EnvironmentFailure without the extra `plot`.
         """
         from .plots.mode_shapes import shapes
 
@@ -271,7 +286,7 @@ class Modes(AssessedAnswer):
         return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
 
     def _which(self, which: Sequence[int] | None) -> Sequence[int]:
-        """The shapes that are asked for, or the first.  SceneError for one that is not there."""
+        """Indices of the requested shapes, by default the first; SceneError for an unknown one."""
         if which is None:
             return range(min(_PANELS, len(self)))
         if isinstance(which, str) or not isinstance(which, Sequence) or not 0 < len(which) <= 12:
@@ -290,13 +305,13 @@ class Modes(AssessedAnswer):
         amplitude: float | None = None,
         title: str = "Natural motions",
     ) -> SceneView:
-        """The motions of `which`, counted from 0, as they move: one page on which each can be
-        chosen, and with `path` written there, see `Result.view`.  Unless given they are the first
-        six but for those of frequency 0.
+        """Animated mode shapes on one page, written to `path` if given; see `Result.view`.
 
-        The point that moves most moves by `amplitude`, 0.08 unless given, times the size of the
-        scene, and nothing turns by more than 0.8 rad; loops stay closed.  SceneError for a shape
-        that is not there, EnvironmentFailure without the extras.
+        `which` are indices from 0 of the modes to choose from, by default the first six with
+        nonzero frequency.  The largest displacement is `amplitude` (default 0.08) times the size
+        of the scene, and no rotation exceeds 0.8 rad; loops stay closed.
+
+        Raises SceneError for an unknown shape, EnvironmentFailure without the extras.
         """
         from .plots.mode_animation import view
 
@@ -311,8 +326,10 @@ class Modes(AssessedAnswer):
         return made
 
     def plot_eigenvalues(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure`: eigenvalues by growth in 1/s and angular frequency in rad/s,
-        with lines of equal damping; written to `path` where it is given.
+        """Eigenvalue plot as a `matplotlib.figure.Figure`, written to `path` if given.
+
+        The axes are the growth rate in 1/s and the angular frequency in rad/s, with lines of equal
+        damping ratio.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
@@ -322,10 +339,10 @@ class Modes(AssessedAnswer):
 
     @property
     def growing(self) -> NDArray[np.bool_]:
-        """(k,) which of them grow by themselves."""
+        """Mask (k,) of unstable modes."""
         return self.eigenvalues.real > 0
 
     @property
     def undamped(self) -> bool:
-        """Whether there is neither damping nor gyroscopic load in them."""
+        """Whether the modes have neither damping nor gyroscopic terms."""
         return not np.iscomplexobj(self.shapes)
