@@ -1,10 +1,9 @@
-"""How a linear model answers harmonic pushes: H(i omega), outputs by inputs, O(bodies) each.
+"""Frequency response H(i omega) of a linear model, O(bodies) per frequency.
 
-The amplitudes of a push r exp(s t) are x = Z(s)^-1 r with Z(s) = s^2 M + s C + K, by one
-elimination from the tips to the root for every s.  A tree can resonate outboard of a hinge that is
-held fast though all of it does not (an absorber), where that elimination has a pole and loses
-digits.  The response is analytic there: its mean over a circle in the plane of s about the
-frequency.
+An input r exp(s t) has the amplitudes x = Z(s)^-1 r with Z(s) = s^2 M + s C + K, from one
+elimination from the tips to the root per s.  The elimination has a pole, and loses digits, where
+the subtree outboard of a locked hinge resonates although the whole tree does not (an absorber).
+The response is analytic there: it is the mean over a circle about the frequency in the s-plane.
 """
 
 from __future__ import annotations
@@ -45,19 +44,19 @@ if TYPE_CHECKING:
 
 Complex = NDArray[np.complex128]
 
-#: Numbers of one batch of frequencies.
+#: Largest number of values in a batch of frequencies.
 _BATCH = 2**20
-#: Growth of inertia in the elimination from which on digits are looked for elsewhere.
+#: Growth of inertia in the elimination above which means over circles are tried.
 _GROWN = 1e6
-#: Radii of circles in parts of the frequency, how many points they have, and negative powers of
-#: the distance from the centre that these tell from positive ones.
+#: Radii of circles relative to the frequency, points per circle, and the number of negative powers
+#: of the distance from the centre that these points separate from positive ones.
 _CIRCLES, _POINTS, _POLES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7), 8, 3
-#: Parts of a response that may be unknown: good enough, and no answer any more.
+#: Relative errors of a response: sufficient, and too large for a result.
 _GOOD, _LOST = 1e-11, 1e-3
-#: Responses below this part of what the amplitudes of all coordinates reach are rounding.
+#: Responses below this fraction of the bound by the amplitudes of all coordinates are rounding.
 _NOISE = 1e-11
 _ROUNDING = 2.0**-52
-#: Frequencies whose squares, times masses, are numbers.
+#: Limit of frequencies: their squares times masses must not overflow.
 _FASTEST = 1e100
 
 
@@ -66,11 +65,11 @@ class FrequencyResponse(AssessedAnswer):
     """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
 
     Attributes:
-        omega: (k,) rad/s, as asked for.
+        omega: (k,) requested angular frequencies, rad/s.
         inputs, outputs: names.
         input_units, output_units: their units.
         values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
-        findings: risks of the linear model and of what was asked of it.
+        findings: risks of the linear model and of this response.
     """
 
     omega: Array = field(repr=False)
@@ -83,22 +82,23 @@ class FrequencyResponse(AssessedAnswer):
 
     @property
     def frequency(self) -> Array:
-        """(k,) Hz."""
+        """Frequencies (k,) in Hz."""
         return self.omega / (2 * np.pi)
 
     @property
     def magnitude(self) -> Array:
-        """(k, outputs, inputs) in units of the output a unit of the input."""
+        """Magnitude (k, outputs, inputs) in output units per input unit."""
         return np.abs(self.values)
 
     @property
     def phase(self) -> Array:
-        """(k, outputs, inputs) rad in (-pi, pi], negative where the output is behind."""
+        """Phase (k, outputs, inputs), rad in (-pi, pi]; negative where the output lags."""
         return np.angle(self.values)
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure`, Bode's: magnitude and phase of every output under every
-        input; written to `path` where it is given.
+        """Bode plot as a `matplotlib.figure.Figure`, written to `path` if given.
+
+        It shows the magnitude and phase of each output for each input.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
@@ -112,18 +112,18 @@ class FrequencyResponse(AssessedAnswer):
         return bode(self.frequency, values, labels, unit, path)
 
     def nyquist(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure`, Nyquist's: the same in the complex plane."""
+        """Nyquist plot as a `matplotlib.figure.Figure`; see `plot`."""
         from .plots.bode_and_locus import nyquist
 
         return nyquist(*self._curves(), path)
 
     def _curves(self) -> tuple[Complex, list[str]]:
-        """(k, curves) and what each is."""
+        """Values (k, curves) and the label of each curve."""
         labels = [f"{y} / {u}" for y in self.outputs for u in self.inputs]
         return self.values.reshape(len(self.omega), -1), labels
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, for JSON; complex numbers in two parts."""
+        """All data as a dictionary for JSON, with real and imaginary parts."""
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "inputs": list(self.inputs), "outputs": list(self.outputs),
@@ -133,7 +133,7 @@ class FrequencyResponse(AssessedAnswer):
         }  # fmt: skip
 
     def to_dataset(self) -> Any:
-        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
         along = ("omega", "output", "input")
         arrays: dict[str, Any] = {
             "real": (along, self.values.real), "imag": (along, self.values.imag),
@@ -146,7 +146,7 @@ class FrequencyResponse(AssessedAnswer):
         return file_formats.xarray().Dataset(arrays, coords)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        """A row for each frequency."""
+        """Header, then one row per frequency."""
         curves, labels = self._curves()
         parts = [f"{label} {part}" for label in labels for part in ("magnitude", "phase [rad]")]
         yield "omega [rad/s]", "frequency [Hz]", *parts
@@ -155,9 +155,9 @@ class FrequencyResponse(AssessedAnswer):
             yield tuple(repr(float(x)) for x in (omega, omega / (2 * np.pi), *numbers))
 
     def save(self, path: str | Path) -> Path:
-        """All of it: .nc (extra io) or .csv, a row for each frequency.
+        """Save the response: .nc (extra io), or .csv with one row per frequency.
 
-        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
         return file_formats.save(path, self.to_dataset, self._rows())
 
@@ -171,7 +171,7 @@ def frequency_response(
     modal: Ratios = 0.0,
     exact: Chosen = False,
 ) -> FrequencyResponse:
-    """See `Linear.frequency_response`."""
+    """Frequency response of a linear model; see `Linear.frequency_response`."""
     frequencies = angular_frequencies(omega)
     beams = None
     if exact is not False:
@@ -216,12 +216,12 @@ def frequency_response(
 
 
 def _ratio(output: str, pushed: str) -> str:
-    """Unit of one over the other."""
+    """Unit of an output per unit of an input."""
     return f"{output}/({pushed})" if "*" in pushed else f"{output}/{pushed}"
 
 
 def angular_frequencies(omega: ArrayLike) -> Array:
-    """(k,) rad/s.  SceneError for what no angular frequencies are."""
+    """Validated angular frequencies (k,) in rad/s; SceneError for invalid values."""
     try:
         found = np.array(omega, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
@@ -238,7 +238,7 @@ def angular_frequencies(omega: ArrayLike) -> Array:
 
 
 def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
-    """Those that are named, or those of the model, or its disturbances.  SceneError for none."""
+    """Named inputs, else those of the model, else its disturbances; SceneError for none."""
     if inputs is not None:
         return [channel(linear.model, name) for name in some_names("inputs", inputs)]
     pushes = linear.controls or linear.others
@@ -248,7 +248,7 @@ def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequ
 
 
 def _efforts(linear: LinearEquations, pushes: Sequence[Channel]) -> Array:
-    """(n, pushes): what a unit of each does; what the model keeps is not made again."""
+    """Efforts (n, pushes) per unit of each input; matrices cached by the model are reused."""
     if pushes is linear.controls:
         return linear.V
     if pushes is linear.others:
@@ -257,7 +257,7 @@ def _efforts(linear: LinearEquations, pushes: Sequence[Channel]) -> Array:
 
 
 class _Sweep:
-    """The response of some outputs to some pushes, s by s."""
+    """Response of given outputs to given inputs, evaluated for each s."""
 
     def __init__(
         self, linear: LinearEquations, pushes: Sequence[Channel], outputs: Sequence[LinearQuantity],
@@ -283,13 +283,13 @@ class _Sweep:
         self.through = rows.through
 
     def values(self, omega: Array) -> Complex:
-        """(k, outputs, inputs) at angular frequencies (k,)."""
+        """Response (k, outputs, inputs) at angular frequencies (k,)."""
         batch = max(1, _BATCH // max(1, self.columns.size))
         parts = [self._batch(omega[k : k + batch]) for k in range(0, len(omega), batch)]
         return np.concatenate(parts)
 
     def values_and_rounding(self, omega: Array) -> tuple[Complex, Array]:
-        """The same, and the size (outputs, inputs) of responses that are rounding."""
+        """Response as by `values`, and its rounding level (outputs, inputs)."""
         s = np.asarray(1j * omega, dtype=np.complex128)
         return self.values(omega), _NOISE * self._reach(s, self._at(s)[-1])
 
@@ -300,8 +300,11 @@ class _Sweep:
         return values
 
     def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
-        """Values (k, outputs, inputs), growth and grown bodies (k,) of the elimination, and the
-        amplitudes (k, columns, n)."""
+        """Response at s (k,), with the growth of the elimination.
+
+        Returns values (k, outputs, inputs), growth (k,), the bodies (k,) of largest growth, and
+        amplitudes (k, columns, n).
+        """
         x, growth, grown = self.response.amplitudes(s, self.columns)
         moved = x[:, : self.count, self.free]
         if self.modal is not None:
@@ -317,8 +320,10 @@ class _Sweep:
         return found, growth, grown, moved
 
     def _around(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
-        """The response where the elimination lost digits: what is known best of it and its means
-        over circles."""
+        """Response where the elimination lost digits: the most accurate of it and circle means.
+
+        Raises NumericalFailure at a resonance without damping.
+        """
         best, unknown = straight, _ROUNDING * growth
         turns = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
         for part in _CIRCLES:
@@ -342,8 +347,11 @@ class _Sweep:
         return best
 
     def _reach(self, s: Complex, moved: Complex) -> Array:
-        """(outputs, inputs): bound of the response if every coordinate moved as far, beside its
-        size, as the one that moves most at s (k,)."""
+        """Bound (outputs, inputs) of the response at s (k,).
+
+        It assumes that every coordinate moves as far, relative to its scale, as the one that moves
+        most.
+        """
         sizes = self.sizes[self.free]
         most = (np.abs(moved) / sizes).max(axis=(0, 2), initial=0.0)
         size = float(np.abs(s).max())
@@ -355,7 +363,7 @@ class _Sweep:
 def _response(
     linear: LinearEquations, lossy: LoopedEngine | None, beams: ExactBeams | None
 ) -> HarmonicResponse | Amplitudes:
-    """What solves for amplitudes: of a tree at rest by elimination, else from matrices."""
+    """Solver for amplitudes: elimination for a tree at rest, else from matrices."""
     state, loops = linear.state, linear.mechanism
     if loops is not None or linear.turning is not None or linear.carrying is not None:
         lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
@@ -367,10 +375,11 @@ def _response(
 
 
 def _pole_share(values: Complex, turns: Complex, noise: Array) -> float:
-    """Largest part of the responses (k, outputs, inputs) on a circle that belongs to poles within.
+    """Largest relative share of poles within a circle in the responses on it.
 
-    An analytic function has no negative powers of the distance from the centre.  Its size is that
-    on the circle: at the centre it may be zero (an antiresonance).
+    `values` are the responses (k, outputs, inputs) on the circle.  An analytic function has no
+    negative powers of the distance from the centre.  The share is relative to the magnitude on the
+    circle because the value at the centre may be zero (an antiresonance).
     """
     powers = turns[None] ** np.arange(1, _POLES + 1)[:, None]
     poles = np.abs(np.einsum("pk,kij->pij", powers, values) / len(turns)).max(axis=0)

@@ -1,4 +1,4 @@
-"""Linear: a scene made linear about a state, and what follows from that."""
+"""Linear model of a scene about a state, with its modes and responses."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ from .validity import find_linear_risks
 
 
 class Linear(StateSpace):
-    """Linear equations of motion with their natural motions; see `Equations`."""
+    """Linear model about an operating point: matrices, modes, responses; see `LinearEquations`."""
 
     def modes(self, count: int | None = None, damped: bool | None = None) -> Modes:
-        """Natural motions: all, or the `count` slowest ones; with C where there is any, `damped`
-        False leaves it out.
+        """Normal modes: all, or the `count` slowest.
 
-        Few of many come by shift and invert over the O(bodies) solution.  Of undamped ones the
-        pivots of the sweep count how many there are, so that none is missed.
+        C is included if it is nonzero, unless `damped` is False.  A small share of many modes is
+        computed by shift-and-invert iteration with the O(bodies) solution.  Undamped modes are
+        counted by the pivots of the sweep, so that none is missed.
 
-        Raises SceneError for a count that makes no sense, NumericalFailure where a motion moves no
+        Raises SceneError for an invalid `count` or `damped`, NumericalFailure where a mode moves no
         inertia or the iteration does not converge.
         """
         if damped is not None and not isinstance(damped, bool | np.bool_):
@@ -51,19 +51,23 @@ class Linear(StateSpace):
 
     @cached_property
     def frame(self) -> str:
-        """Frame of x and of all frequencies: "rotating" where coordinates turn along with bodies
-        that spin at the state, so that frequencies are those that the rotor sees; else "fixed"."""
+        """Frame of x and of all frequencies, "fixed" or "rotating".
+
+        It is "rotating" where coordinates rotate with bodies that spin at the state, so that
+        frequencies are relative to the rotor.
+        """
         return frame_of(self)
 
     def to_fixed_frame(self) -> Linear:
-        """The same model in the fixed frame: increments of an axisymmetric rotor as they are in
-        axes that do not turn, those of its supports as they were; exact.  Coordinates keep their
-        names; those of three or more equal blades are the pattern of the rotor at the azimuths
-        where the blades are now (multi-blade coordinates).  Pushes and
+        """Linear model in the fixed frame, by an exact transformation.
+
+        Increments of an axisymmetric rotor refer to non-rotating axes; those of its supports do not
+        change.  Coordinates keep their names.  For three or more equal blades they are the pattern
+        of the rotor at the current azimuths of the blades (multi-blade coordinates).  Inputs and
         outputs are those at the ends of bodies in inertial axes.
 
         Raises SceneError where a rotor is neither axisymmetric nor one of equal blades, or its
-        coefficients change as it turns.
+        coefficients change as it rotates.
         """
         if self.frame == "fixed":
             return self
@@ -71,7 +75,7 @@ class Linear(StateSpace):
 
     @staticmethod
     def check_count(count: int | None, most: int) -> None:
-        """Raises SceneError for a number of motions that is none from 1 to `most`."""
+        """Raise SceneError for a number of modes other than None and 1 to `most`."""
         if count is None:
             return
         if not isinstance(count, (int, np.integer)):
@@ -91,87 +95,92 @@ class Linear(StateSpace):
         modal: Ratios = 0.0,
         exact: Chosen = False,
     ) -> FrequencyResponse:
-        """Amplitudes of outputs under harmonic inputs at angular frequencies omega (k,) in rad/s,
-        O(bodies) a frequency.
+        """Frequency response at angular frequencies omega (k,) in rad/s, O(bodies) per frequency.
 
-        `inputs` are names as of `Model.linearize`: those of v where none are named, of w where
-        there are no v.  `outputs` are coordinates ("shoulder.angle"), their rates
-        ("shoulder.angle_rate"), motions of bodies and ends in inertial axes ("boom.tip.position.y",
-        "boom.tip.vy", "boom.tip.angular_velocity.z"), "strut.length" and "strut.effort" of springs,
-        and outputs of the scene, expressions too; beside the state and, under accelerations of the
-        ground, relative to it.  Where none are named they are the outputs of the scene, or all
-        coordinates.
+        `inputs` are names as in `Model.linearize`, by default those of v, or of w without v.
+        `outputs` are coordinates ("shoulder.angle"), their rates ("shoulder.angle_rate"), motions
+        of bodies and ends in inertial axes ("boom.tip.position.y", "boom.tip.vy",
+        "boom.tip.angular_velocity.z"), "strut.length" and "strut.effort" of springs, and outputs of
+        the scene, including expressions.  They are deviations from the state and, under
+        accelerations of the ground, relative to the ground.  The default is the outputs of the
+        scene, or all coordinates if it has none.
 
-        Two kinds of damping join what the scene has.  `structural` are loss factors eta: stiffness
-        k of laws, springs and shapes becomes k (1 + i eta), of all of them or by the names of
-        hinges, chains, flexible bodies and springs; what expressions give loses nothing.  `modal`
-        are parts of the critical damping: of all natural motions of the undamped scene (from their
-        matrices), or of as many of the slowest as there are numbers (O(bodies) each), the others
-        staying as they are.
+        Two kinds of damping can be added to that of the scene.  `structural` are loss factors eta:
+        the stiffness k of laws, springs and flexible bodies becomes k (1 + i eta), for all of them
+        or by names of hinges, chains, flexible bodies and springs; stiffness from expressions is
+        lossless.  `modal` are damping ratios: one for all modes of the undamped scene (from its
+        matrices), or one for each of the slowest modes (O(bodies) each); other modes do not change.
 
-        `exact`, True for all or a list of names, gives uniform beams their exact dynamic stiffness
-        in the directions in which they have shapes, in place of these: bending after Euler and
-        Bernoulli, twist, tension, at any frequency.
+        `exact`, True for all or a list of names, replaces the shape functions of uniform beams by
+        the exact dynamic stiffness in the directions that have shape functions: Euler-Bernoulli
+        bending, torsion and tension, at any frequency.
 
-        Raises SceneError for a name or frequency that does not fit, NumericalFailure at a resonance
-        without damping.
+        Raises SceneError for an invalid name or frequency, NumericalFailure at a resonance without
+        damping.
         """
         return frequency_response(self, omega, inputs, outputs, structural, modal, exact)
 
     def exact_modes(self, count: int, exact: Chosen = True) -> DynamicStiffnessModes:
-        """The `count` slowest undamped natural motions with exact beams (`exact` as in
-        `frequency_response`), found by counting: none is missed, however many there are.
+        """The `count` slowest undamped modes with exact beams.
 
-        Raises SceneError for beams that the exact solution does not hold for, springs between
-        bodies, loads without potential and a state from which a motion grows.
+        `exact` is as in `frequency_response`.  Modes are found by counting, so that none is missed.
+
+        Raises SceneError for beams without an exact solution, springs between bodies, loads without
+        a potential, and an unstable state.
         """
         return exact_modes(self, count, exact)
 
     @cached_property
     def findings(self) -> tuple[Risk, ...]:  # type: ignore[override]
-        """Risks of the state, and of what a linear model leaves out."""
+        """Risks of the operating point and of effects that a linear model omits."""
         return tuple(find_linear_risks(self))
 
     def output_matrices(self, outputs: Sequence[str] | None = None) -> tuple[Array, Array]:
-        """C (outputs, states) and D (outputs, inputs) of y = C z + D v; `outputs` as
-        `frequency_response` takes them."""
+        """C (outputs, states) and D (outputs, inputs) of y = C z + D v.
+
+        `outputs` are as in `frequency_response`.
+        """
         from .python_control import output_matrices
 
         return output_matrices(self, outputs, self.controls, self.B)[1:]
 
     def to_control(self, outputs: Sequence[str] | None = None, disturbances: bool = False) -> Any:
-        """`control.StateSpace` of python-control (extra control), its signals named, with _ for
-        every dot; `disturbances` are inputs behind the others.  Discrete time, reduction by
-        balancing or modes, regulators and observers are that library's.
+        """Model as a `control.StateSpace` of python-control (extra control).
 
-        Raises SceneError where there is no input or an output is unknown, EnvironmentFailure
-        without the extra.
+        Signals are named, with _ for each dot.  `disturbances` appends the disturbances to the
+        inputs.  python-control provides discrete time, balanced and modal reduction, regulators and
+        observers.
+
+        Raises SceneError without inputs or for an unknown output, EnvironmentFailure without the
+        extra.
         """
         from .python_control import to_control
 
         return to_control(self, outputs, disturbances)
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure`: M, C and K as maps, a row and a column for each coordinate,
-        colours by sign and size; written to `path` where it is given.
+        """Maps of M, C and K as a `matplotlib.figure.Figure`, written to `path` if given.
 
-        Raises SceneError where nothing moves, EnvironmentFailure without the extra `plot`.
+        Each coordinate has a row and a column; colours show sign and magnitude.
+
+        Raises SceneError without coordinates, EnvironmentFailure without the extra `plot`.
         """
         from .plots.matrices import matrices
 
         return matrices(self, path)
 
     def to_dict(self) -> dict[str, Any]:
-        """Names, state, matrices and risks, for JSON."""
+        """Names, state, matrices, frame and risks as a dictionary for JSON."""
         from .file_formats import dictionary
 
         return dictionary(self) | {"frame": self.frame} | self.assessment()
 
     def save(self, path: str | Path) -> Path:
-        """Matrices by the names of their rows and columns: .nc (extra io), or .csv with a row for
-        every entry that is not zero.
+        """Save the matrices with row and column names: .nc (extra io) or .csv.
 
-        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        The .csv file has one row per nonzero entry.
+
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
         from .file_formats import dataset, entries, save
 

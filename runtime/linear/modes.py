@@ -136,7 +136,7 @@ class Modes(AssessedAnswer):
 
     @property
     def damping(self) -> Array:
-        """Damping ratio (k,); negative for unstable modes, 0 for rigid-body modes."""
+        """Damping ratio (k,); negative for unstable modes, 0 where omega is 0."""
         omega = self.omega
         rates = 0.0 - self.eigenvalues.real
         return np.divide(rates, omega, out=np.zeros_like(omega), where=omega > 0)

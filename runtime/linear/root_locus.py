@@ -1,8 +1,7 @@
-"""Natural motions along a parameter of a scene, and the value at which a scene loses its stability.
+"""Root locus over a parameter of a scene, and the stability limit.
 
-The motions are paired from one value to the next by their eigenvalues and shapes, so that curves
-may cross: with the spin of a shaft they are Campbell's diagram, with any other number of the scene
-its root locus.
+Modes at successive parameter values are paired by eigenvalues and shapes, so that curves may cross.
+Over the spin of a shaft the result is a Campbell diagram, over any other parameter a root locus.
 """
 
 from __future__ import annotations
@@ -29,28 +28,30 @@ from .modes import Complex, Modes
 if TYPE_CHECKING:
     from .linear_model import Linear
 
-#: A scene made linear at a value of its parameter.
+#: Function that returns the linear model at a parameter value.
 At = Callable[[float], "Linear"]
 
-#: What `Model.locus` may be asked for.
+#: Accepted values of `frame` in `Model.locus`.
 FRAMES = ("auto", "fixed", "rotating")
-#: How near a critical value is found, in parts of the range that is searched.
+#: Tolerance of a stability limit, relative to the search range.
 _NEAR = 1e-12
-#: Part of its first value to which the slowest frequency falls before a limit point.
+#: Fraction of its initial value below which the lowest frequency indicates a limit point.
 _VANISHING = 0.03
-#: Ratio of loads to those that buckle in another plane up to which both buckle together.
+#: Ratio of buckling loads in two planes up to which both planes buckle together.
 _ALIKE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
 class RootLocus(AssessedAnswer):
-    """Motions over a parameter: `values` (m,), `eigenvalues` (m, k), a column for each motion; nan
-    where it is not among those of its value.
+    """Eigenvalues over a parameter.
 
     Attributes:
-        frame: of frequencies and whirl, "fixed" or "rotating", in which coordinates of spinning
-            bodies turn along: a motion that whirls at f in the fixed frame has |f - spin| there.
-        whirl: (m, k) sense of the motions about the spin; see `Modes.whirl`.
+        values: (m,) values of the parameter.
+        eigenvalues: (m, k), one column per mode; nan where a mode is missing at a value.
+        frame: frame of frequencies and whirl, "fixed" or "rotating".  In the rotating frame, in
+            which coordinates rotate with the spinning bodies, a whirl of frequency f in the fixed
+            frame has |f - spin|.
+        whirl: (m, k) whirl direction of the modes about the spin; see `Modes.whirl`.
         findings: risks at each value, and of the diagram.
     """
 
@@ -63,18 +64,20 @@ class RootLocus(AssessedAnswer):
 
     @property
     def frequency(self) -> Array:
-        """(m, k), Hz."""
+        """Frequencies (m, k) in Hz."""
         return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
     @property
     def growth(self) -> Array:
-        """(m, k), 1/s; negative of what decays."""
+        """Growth rates (m, k) in 1/s; negative for decay."""
         return np.asarray(self.eigenvalues.real)
 
     def plot(self, path: str | Path | None = None, orders: ArrayLike = ()) -> Any:
-        """`matplotlib.figure.Figure`: frequencies and growth over the parameter, with lines at
-        `orders` times a parameter that is a spin in rad/s, of the same frame; written to `path`
-        where it is given.
+        """Root locus or Campbell diagram as a `matplotlib.figure.Figure`.
+
+        It shows frequencies and growth rates over the parameter.  If this is a spin in rad/s,
+        `orders` adds lines at multiples of it, in the same frame.  The figure is written to `path`
+        if given.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
@@ -86,7 +89,7 @@ class RootLocus(AssessedAnswer):
         )
 
     def to_dataset(self) -> Any:
-        """`xarray.Dataset` of frequency and growth.  EnvironmentFailure without the extra."""
+        """`xarray.Dataset` of frequency, growth and whirl; EnvironmentFailure without the extra."""
         along = ("value", "motion")
         arrays: dict[str, Any] = {
             "frequency": (along, self.frequency, {"units": "Hz"}),
@@ -98,7 +101,7 @@ class RootLocus(AssessedAnswer):
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        """A row for each value."""
+        """Header, then one row per parameter value."""
         motions = range(1, self.eigenvalues.shape[1] + 1)
         yield (
             self.parameter,
@@ -109,9 +112,9 @@ class RootLocus(AssessedAnswer):
             yield tuple(map(repr, (value, *row)))
 
     def save(self, path: str | Path) -> Path:
-        """Frequencies and growth: .nc (extra io) or .csv, a row for each value of the parameter.
+        """Save frequencies and growth: .nc (extra io), or .csv with one row per parameter value.
 
-        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
         return file_formats.save(path, self.to_dataset, self._rows())
 
@@ -119,7 +122,7 @@ class RootLocus(AssessedAnswer):
 def trace_modes(
     at: At, parameter: str, values: Array, count: int | None, damped: bool | None, frame: str
 ) -> RootLocus:
-    """Motions at each value, those that go on in one column; `frame` as in `Model.locus`."""
+    """Modes at each parameter value, paired in columns; `frame` as in `Model.locus`."""
     models, risks = _framed([at(value) for value in values.tolist()], parameter, frame)
     found = [linear.modes(count, damped) for linear in models]
     width = max(len(one) for one in found)
@@ -144,7 +147,7 @@ def trace_modes(
 def _framed(
     models: list[Linear], parameter: str, frame: str
 ) -> tuple[list[Linear], tuple[Risk, ...]]:
-    """The models in the frame that is asked for, and what "auto" could not do."""
+    """Models in the requested frame, with a risk if "auto" cannot use the fixed frame."""
     if frame not in FRAMES:
         raise SceneError(f'frame = {abbreviate(frame)}: expected "auto", "fixed" or "rotating"')
     if frame == "rotating":
@@ -167,7 +170,7 @@ def _rotating(parameter: str, why: str) -> Risk:
 
 
 def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
-    """The column of each motion: of the one before that it is most like."""
+    """Column of each mode: that of the most similar mode at the previous value."""
     apart = np.abs(before.eigenvalues[:, None] - now.eigenvalues[None, :])
     apart /= np.maximum(1e-300, np.maximum(before.omega[:, None], now.omega[None, :]))
     unit = [x / np.linalg.norm(x, axis=0) for x in (before.shapes, now.shapes)]
@@ -181,9 +184,15 @@ def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
 
 @dataclass(frozen=True)
 class StabilityLimit(AssessedAnswer):
-    """The value of a parameter beyond which a motion grows; `kind` is "divergence" (a stiffness is
-    lost, as in buckling) or "flutter", `frequency` in Hz, in the fixed frame unless `frame` is
-    "rotating"; `findings` are the risks of the last stable state below it."""
+    """Parameter value at the stability limit, beyond which a mode is unstable.
+
+    Attributes:
+        kind: "divergence" (loss of stiffness, as in buckling) or "flutter".
+        frequency: of the unstable mode, Hz, in `frame`.
+        moving: dominant coordinates of the unstable mode.
+        findings: risks of the last stable state below the limit.
+        frame: "fixed" or "rotating".
+    """
 
     parameter: str
     value: float
@@ -195,10 +204,11 @@ class StabilityLimit(AssessedAnswer):
 
 
 def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
-    """An edge between `low`, where no motion grows, and `high`, where one does, by
-    bisection; of several edges between them one is found.
+    """Stability limit between a stable value `low` and an unstable value `high`, by bisection.
 
-    Raises SceneError where the ends are not so.
+    One of several limits between them is found.
+
+    Raises SceneError if `low` is unstable or `high` is stable.
     """
     first, last = _modes_at(at, low), _modes_at(at, high)
     if first is None or _growing(first) is not None:
@@ -234,7 +244,7 @@ def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
 
 
 def _modes_at(at: At, value: float) -> Modes | None:
-    """All motions; None where the scene has no equilibrium."""
+    """All modes at a parameter value; None where the scene has no equilibrium."""
     try:
         (linear,), _ = _framed([at(value)], "", "auto")
         modes = linear.modes()
@@ -246,14 +256,17 @@ def _modes_at(at: At, value: float) -> Modes | None:
 
 
 def _growing(modes: Modes) -> int | None:
-    """The motion that grows most."""
+    """Index of the mode with the largest growth rate; None if no mode is unstable."""
     k = int(modes.eigenvalues.real.argmax())
     return k if modes.eigenvalues[k].real > 0 else None
 
 
 def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
-    """Risks of the last stable state; that its loads take away a stiffness is the answer itself,
-    also where another plane buckles at the same value, and fast motions have no part in it."""
+    """Risks of the last stable state that concern the stability limit.
+
+    Omitted are loss of stiffness and buckling, which are the result itself (also where another
+    plane buckles at the same value), and limits at high frequencies, which do not affect it.
+    """
     own = (
         risk for risk in below.risks
         if risk.name not in ("unstable", "unrestrained", "frequency-range")
@@ -263,7 +276,7 @@ def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
 
 
 def _lost_equilibrium(parameter: str, high: float, first: Modes, below: Modes) -> tuple[Risk, ...]:
-    """No equilibrium was found beyond the value: at a limit point a stiffness vanishes before."""
+    """Risk that a missing equilibrium is no limit point, where a stiffness would vanish first."""
     if float(below.omega.min()) <= _VANISHING * float(first.omega.min()):
         return ()
     return (

@@ -1,4 +1,4 @@
-"""What a linear model cannot say of its scene: states that do not last, and what nothing holds."""
+"""Validity limits of a linear model: unsteady states, omitted effects and instability."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from .rotors.blades import find_blades
 if TYPE_CHECKING:
     from .linear_equations import LinearEquations
 
-#: Efforts that are rounding, in parts of those that cancel.
+#: Efforts that are rounding, relative to those that cancel.
 _CANCELLED = 1e-11
-#: Coordinates up to which all motions are looked for.
+#: Largest number of coordinates for which all modes are computed.
 _ALL_MOTIONS = 400
 
 
 def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
-    """Risks of the state and of what the linear model leaves out, the gravest first."""
+    """Risks of the operating point and of omitted effects, most severe first."""
     state = linear.state
     yield from find_state_risks(linear.model, state.t, state.q, state.u)
     unsteady = list(_unsteady(linear))
@@ -57,7 +57,7 @@ def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
 
 
 def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
-    """What of the scene a linear model leaves out: controllers, outputs, the time."""
+    """Risks of omissions of a linear model: controllers, outputs, dependence on time."""
     for one in linear.model.scene.controller:
         yield information(
             "controller-left-out",
@@ -82,8 +82,11 @@ def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
 def find_response_risks(
     linear: LinearEquations, pushes: Sequence[Channel], are_outputs_chosen: bool = False
 ) -> Iterator[Risk]:
-    """Risks of a linear model for its steady response to some inputs, which a growing motion
-    prevents; inputs and outputs that were not requested are left out."""
+    """Risks of a linear model for its steady-state response to inputs.
+
+    Instability is an objection because it prevents a steady state.  Inputs and outputs that were
+    not requested are left out.
+    """
     asked = {f'input "{one.name}"' for one in pushes}
     for risk in linear.risks:
         if risk.name in INPUT_RISKS and risk.element not in asked:
@@ -93,7 +96,7 @@ def find_response_risks(
 
 
 def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
-    """A state that does not last, or along whose motion matrices and inputs change."""
+    """Risks of an unsteady state, and of matrices and inputs that change along its motion."""
     later = LaterStates(linear)
     leaving = find_departure(linear, later)
     if leaving is not None:
@@ -121,7 +124,7 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
 
 
 def changing_risk(linear: LinearEquations, name: str) -> Risk:
-    """An input or output whose column or row changes."""
+    """Risk of an input whose column changes along the motion or with time."""
     return Risk(
         "changing-input", f'input "{name}"',
         f"{name} changes its effect along the motion of this state or with time: the model has "
@@ -130,7 +133,7 @@ def changing_risk(linear: LinearEquations, name: str) -> Risk:
 
 
 def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
-    """A state at t (s) that does not last."""
+    """Risk of an unsteady state at t (s)."""
     names = abbreviate_names(leaving.coordinates)
     if leaving.t == t:
         means = (
@@ -147,7 +150,7 @@ def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
 
 
 def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
-    """Inputs whose effects, columns (n, inputs), are zero."""
+    """Risks of inputs whose columns in `effects` (n, inputs) are zero."""
     for name, column in zip(linear.inputs, effects.T, strict=True):
         if len(linear) and not column.any():
             yield information(
@@ -157,15 +160,18 @@ def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
 
 
 def is_unsteady(linear: LinearEquations) -> bool:
-    """Whether closed loops are at a state that does not last, so that accelerations turn rows."""
+    """Whether closed loops are at an unsteady state, so that accelerations rotate rows."""
     if linear.mechanism is None or find_departure(linear) is None:
         return False
     return not _balanced(linear, linear.mechanism.ways)
 
 
 def _balanced(linear: LinearEquations, ways: Array) -> bool:
-    """Whether what pushes along the motions of a mechanism is rounding of what cancels there, which
-    may still move what hardly anything holds."""
+    """Whether efforts along the independent motions of a mechanism are rounding errors.
+
+    They are relative to the efforts that cancel.  Rounding may still move weakly constrained
+    coordinates.
+    """
     state, tree = linear.state, linear.tree
     efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.a, tree.start_memory())
     left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
