@@ -1,1 +1,1 @@
-"""Scenes made linear about a state: their matrices, and what follows from them."""
+"""Linear models of scenes about a state: matrices, modes and responses."""

@@ -1,12 +1,12 @@
 """Motions of drives as inputs of linear models: a road, a shaker, a platform.
 
-Beside a state the residual changes with a driven coordinate d as with any other,
+About a state the residual depends on a driven coordinate d as on any other,
 
     M x'' + C x' + K x = V v - (M_d d'' + C_d d' + K_d d),
 
-the columns being directional derivatives of the same recursion, exact, O(bodies).  Matrices take
-the acceleration d'' for an input and d, d' for states behind x, x'; a frequency response takes d or
-d' as well, which are powers of s apart.
+where the columns are exact directional derivatives of the same recursion, O(bodies).  Matrices have
+the acceleration d'' as an input and d, d' as states after x, x'; a frequency response also accepts
+d or d' as an input, which differ by powers of s.
 """
 
 from __future__ import annotations
@@ -34,20 +34,19 @@ if TYPE_CHECKING:
 
 
 class Motion(NamedTuple):
-    """The motion of a drive: its unit, the place of its speed, and how often it is differentiated
-    by the time."""
+    """Motion of a drive: its unit, the index of its speed, and the order of the time derivative."""
 
     unit: str
     speed: int
     order: int
 
 
-#: Places of speeds, and how far each goes along.
+#: Driven speeds of one common motion: (index, factor) each.
 Moves = tuple[tuple[int, float], ...]
 
 
 class Columns(NamedTuple):
-    """K_d, C_d and M_d (nu,): what a unit of d, d' and d'' asks of the efforts."""
+    """Columns K_d, C_d and M_d (nu,): required efforts per unit of d, d' and d''."""
 
     stiffness: Array
     damping: Array
@@ -55,8 +54,11 @@ class Columns(NamedTuple):
 
 
 def motions(model: CompiledScene) -> dict[str, Motion]:
-    """The motions of every drive by the names that results have: "platform.displacement",
-    "platform.displacement_rate", "platform.displacement_acceleration"."""
+    """Motions of all drives by their names in results.
+
+    Names are such as "platform.displacement", "platform.displacement_rate" and
+    "platform.displacement_acceleration".
+    """
     found = dict[str, Motion]()
     for slots, k, _ in _driven(model):
         if slots.straight:
@@ -72,7 +74,7 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
 
 
 def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]]:
-    """(slots of a hinge, which of its coordinates, its drive) of everything driven."""
+    """Yield (slots of the hinge, index of its coordinate, drive) of all driven coordinates."""
     packed = model.packed
     for place, k in packed.system.driven:
         number = packed.topology.at(place)[1]
@@ -82,21 +84,21 @@ def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]
 
 
 def accelerations(model: CompiledScene, moves: Moves) -> list[str]:
-    """Names of the accelerations of drives."""
+    """Names of the accelerations of the drives in `moves`."""
     speeds = {speed for speed, _ in moves}
     return [x for x, one in motions(model).items() if one.order == 2 and one.speed in speeds]
 
 
 def coordinate(model: CompiledScene, speed: int) -> str:
-    """Name of the coordinate whose rate a speed is."""
+    """Name of the coordinate whose rate is the speed."""
     slots = model.layout.hinge_of_speed(speed)
     return f"{slots.name}.{slots.q_names[speed - slots.u]}"
 
 
 def followers(model: CompiledScene, name: str, t: float) -> Moves:
-    """The drives that follow an input of the scene, and their slopes by it.
+    """Drives that follow an input of the scene, with their slopes with respect to it.
 
-    Raises SceneError where a slope does not last.
+    Raises SceneError where a slope depends on time.
     """
     found, channels = dict[int, float](), model.scene.channels
     for slots, k, drive in _driven(model):
@@ -115,7 +117,7 @@ def followers(model: CompiledScene, name: str, t: float) -> Moves:
 
 
 def columns_of(engine: LoopedEngine, state: State, moves: Moves) -> Columns:
-    """(nu,) what drives of a tree that go along with one motion ask for."""
+    """Columns (nu,) of drives of a tree that follow one common motion."""
     along = np.zeros(engine.nu)
     for speed, factor in moves:
         along[speed] += factor
@@ -123,8 +125,10 @@ def columns_of(engine: LoopedEngine, state: State, moves: Moves) -> Columns:
 
 
 def slopes_along(engine: LoopedEngine, state: State, along: Array) -> Columns:
-    """(nu,) slopes of the residual along a motion of all speeds, driven ones (whose rates are
-    speeds) too."""
+    """Slopes (nu,) of the residual along a motion of all speeds.
+
+    Driven speeds, which are the rates of their coordinates, are included.
+    """
     first, driven = engine.packed.system.places["u"], engine.packed.system.driven
     engine = _undriven(engine)
     tangent, still = TangentMatrix(engine), np.zeros(engine.nu)
@@ -141,5 +145,5 @@ def slopes_along(engine: LoopedEngine, state: State, along: Array) -> Columns:
 
 
 def _undriven(engine: LoopedEngine) -> LoopedEngine:
-    """The tree with the same numbers, moved by nobody."""
+    """Engine of the same tree without drives."""
     return LoopedEngine(packed_system(without_drives(engine.packed.system), engine.packed))

@@ -1,8 +1,8 @@
-"""Whose energy a motion is: bodies carry it, laws and shapes store it.
+"""Energy shares of modes: kinetic by body, elastic by hinge law, flexible body and spring.
 
-Of a shape x the kinetic part of body b is x* M_b x over x* M x, where M_b is the mass matrix of the
-scene with the inertia of that body alone; the elastic part of coordinate j is conj(x_j) (K_e x)_j
-over x* K_e x.  Both come from passes over the bodies, without a matrix.
+For a shape x the kinetic share of body b is x* M_b x / x* M x, where M_b is the mass matrix of the
+scene with the inertia of that body only; the elastic share of coordinate j is
+conj(x_j) (K_e x)_j / x* K_e x.  Both result from passes over the bodies, without a matrix.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
-    """(n, k): a real operator times every shape, complex ones in two parts."""
+    """Product (n, k) of a real operator and each shape, complex shapes in two parts."""
     columns = [
         product(x.real) + (1j * product(x.imag) if np.iscomplexobj(x) else 0.0) for x in shapes.T
     ]
@@ -32,12 +32,12 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 
 def kinetic(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
-    """Body -> (k,): its part of each shape's kinetic energy."""
+    """Share (k,) of each body in the kinetic energy of each shape."""
     return kinetic_of_speeds(linear.model, linear.state.q, linear.spread(shapes))
 
 
 def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
-    """Body -> (k,): its part of the kinetic energy of all speeds (nu, k) at q (nq,)."""
+    """Share (k,) of each body in the kinetic energy of speeds (nu, k) at q (nq,)."""
     engine, parts = model.apart, [np.real(speeds)]
     if np.iscomplexobj(speeds):
         parts.append(np.imag(speeds))
@@ -51,7 +51,7 @@ def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> d
 
 
 def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
-    """Owner of coordinates, or "springs" -> (k,): its part of each shape's elastic energy."""
+    """Share (k,) of each owner of coordinates, and of "springs", in the elastic energy."""
     tree, free = linear.tree, list(linear.model.free_speeds)
     shapes = linear.spread(shapes)[free]
     whole, lawless, held = (
@@ -67,7 +67,7 @@ def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
 
 
 def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
-    """K x of a scene, x' = G x + du."""
+    """Operator K x of a scene, with x' = G x + du."""
     pencil = Pencil(engine, linear.state, list(linear.model.free_speeds))
     turning = linear.turning if linear.mechanism is None else None
     if turning is None:
@@ -76,7 +76,7 @@ def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
 
 
 def _by_shapes(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
-    """(n, k): the stiffness of flexible bodies times increments x of all free speeds."""
+    """Product (n, k) of the stiffness of flexible bodies and increments x of all free speeds."""
     moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
     moved[list(model.free_speeds)] = x
     pressed = np.zeros_like(moved)
@@ -86,7 +86,7 @@ def _by_shapes(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
 
 
 def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:
-    """Sums of rows (k,) by name over the sum of all; nan where there is none."""
+    """Sums of rows (k,) by name relative to the total; nan where the total is zero."""
     found: dict[str, Array] = {}
     for name, row in zip(names, energies, strict=True):
         found[name] = found[name] + row if name in found else row

@@ -1,4 +1,4 @@
-"""Linear models as data: plain dictionaries, tables, and NetCDF (extra: io)."""
+"""Linear models as dictionaries, tables and NetCDF files (extra: io)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..platform_support.safe_files import replace_atomically, require_path, seal
 if TYPE_CHECKING:
     from .state_space import StateSpace
 
-#: What a linear model is saved as: matrix, its rows and its columns.
+#: Saved matrices of a linear model: name, row dimension and column dimension.
 MATRICES = (
     ("M", "coordinate", "coordinate"), ("C", "coordinate", "coordinate"),
     ("K", "coordinate", "coordinate"), ("damping", "coordinate", "coordinate"),
@@ -30,7 +30,7 @@ MATRICES = (
 
 
 def names(linear: StateSpace) -> dict[str, tuple[str, ...]]:
-    """Names along each dimension."""
+    """Names along each dimension of the matrices."""
     return {
         "coordinate": linear.coordinates, "state": linear.states, "input": linear.inputs,
         "disturbance": linear.disturbances, "drive": linear.driven,
@@ -38,12 +38,12 @@ def names(linear: StateSpace) -> dict[str, tuple[str, ...]]:
 
 
 def _there(linear: StateSpace) -> list[tuple[str, str, str]]:
-    """The matrices that a model has."""
+    """Entries of `MATRICES` that the model has."""
     return [one for one in MATRICES if linear.has_stiffness or "state" in one[1:]]
 
 
 def dictionary(linear: StateSpace) -> dict[str, Any]:
-    """Everything of a linear model that JSON can hold."""
+    """Names, state and matrices of a linear model as a dictionary for JSON."""
     state = linear.state
     return {
         "t": state.t, "q": state.q.tolist(), "u": state.u.tolist(),
@@ -55,7 +55,7 @@ def dictionary(linear: StateSpace) -> dict[str, Any]:
 
 
 def dataset(linear: StateSpace) -> Any:
-    """`xarray.Dataset` of the matrices by the names of their rows and columns."""
+    """`xarray.Dataset` of the matrices with row and column names."""
     along = names(linear)
     arrays = {
         key: ((row, f"{column}2" if column == row else column), getattr(linear, key))
@@ -68,7 +68,7 @@ def dataset(linear: StateSpace) -> Any:
 
 
 def entries(linear: StateSpace) -> Iterator[tuple[str, ...]]:
-    """Every entry that is not zero: matrix, row, column, value."""
+    """Yield a header, then each nonzero entry: matrix, row, column, value."""
     along = names(linear)
     yield "matrix", "row", "column", "value"
     for key, row, column in _there(linear):
@@ -78,8 +78,10 @@ def entries(linear: StateSpace) -> Iterator[tuple[str, ...]]:
 
 
 def save(given: str | Path, dataset: Callable[[], Any], rows: Iterator[tuple[str, ...]]) -> Path:
-    """Write a data set, made by `dataset()`, to .nc or rows to .csv.  SceneError for another
-    ending, EnvironmentFailure without the extra."""
+    """Write the data set of `dataset()` to .nc, or rows to .csv.
+
+    Raises SceneError for another file extension, EnvironmentFailure without the extra.
+    """
     path = require_path(given)
     ending = path.suffix.lower()
     if ending not in (".nc", ".csv"):
@@ -96,7 +98,7 @@ def save(given: str | Path, dataset: Callable[[], Any], rows: Iterator[tuple[str
 
 
 def xarray() -> Any:
-    """The package, with what writes NetCDF.  EnvironmentFailure where the extra is missing."""
+    """The package xarray with a NetCDF writer; EnvironmentFailure without the extra."""
     try:
         import h5netcdf  # noqa: F401
         import xarray as found

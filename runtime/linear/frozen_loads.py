@@ -1,7 +1,8 @@
-"""Forces that stand still: the same tree under forces that no motion changes.
+"""Loads frozen at the operating point: variants of a tree whose loads ignore perturbations.
 
-Beside the whole scene, a tree whose loads and tensions are those of one state, with fixed
-components in inertial axes, lacks what laws and loads do when they are moved.
+In these variants loads and tensions keep their values at one state, with fixed components in
+inertial axes.  The difference to the whole scene is the contribution of laws and loads to the
+matrices.
 """
 
 from __future__ import annotations
@@ -26,15 +27,15 @@ INERTIAL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def without_laws(engine: LoopedEngine) -> LoopedEngine:
-    """The same without laws of hinges."""
+    """The same tree without hinge laws."""
     return LoopedEngine(packed_system(replace(engine.packed.system, laws=()), engine.packed))
 
 
 def with_frozen_springs(engine: LoopedEngine, state: State) -> LoopedEngine:
-    """The same with springs that keep their tension and no laws of hinges: their efforts act along
-    the hinges' own speeds, so that standing ones change nothing.
+    """The same tree with constant spring tensions and without hinge laws.
 
-    A bushing or a force element of a user's own type is left out with all that it does.
+    Efforts of hinge laws act along the speeds of the hinges, so that constant ones would change
+    nothing.  Bushings and user-defined force elements are omitted.
     """
     system = engine.packed.system
     springs = (force for force in system.forces if force.element == ("force", "spring"))
@@ -43,7 +44,7 @@ def with_frozen_springs(engine: LoopedEngine, state: State) -> LoopedEngine:
 
 
 def standing(engine: LoopedEngine, state: State) -> LoopedEngine:
-    """The same with loads too that keep the components in inertial axes that they have there."""
+    """Variant as by `with_frozen_springs`, with loads also constant in inertial axes."""
     held = with_frozen_springs(engine, state)
     system = held.packed.system
     values = _values(system, state).tolist()
@@ -53,9 +54,11 @@ def standing(engine: LoopedEngine, state: State) -> LoopedEngine:
 
 
 def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
-    """The same with every spring between bodies taken apart into two to the ground, each between
-    one of its ends and the place where the other one stands: what is left does not reach from body
-    to body, and acts as before where nothing moves."""
+    """The same tree with each spring between bodies replaced by two springs to the ground.
+
+    Each connects one end to the position of the other end at the state.  These springs do not
+    couple bodies, and their forces at the state are the same.
+    """
     system = engine.packed.system
     first, second = list(system.forces), []
     for k, force in enumerate(system.forces):
@@ -70,7 +73,7 @@ def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
 
 
 def _values(system: System, state: State) -> Array:
-    """What the expressions of a scene give at a state."""
+    """Values of the expressions of a scene at a state."""
     if system.values is None:
         return np.zeros(0)
     given = _given(system, state)
@@ -78,7 +81,7 @@ def _values(system: System, state: State) -> Array:
 
 
 def _given(system: System, state: State) -> dict[str, Array]:
-    """What expressions of a scene read."""
+    """Arguments of the expressions of a scene at a state."""
     inputs = system.inputs_at(state.t)
     return {"t": np.array([state.t]), "q": state.q, "u": state.u, INPUTS: inputs}
 
@@ -86,7 +89,7 @@ def _given(system: System, state: State) -> dict[str, Array]:
 def _dead(
     engine: LoopedEngine, load: LoadNumbers, values: list[float], state: State
 ) -> LoadNumbers:
-    """A load with components in inertial axes; their values join the others."""
+    """Load with constant components in inertial axes, which are appended to `values`."""
     if load.axes < 0:
         return load
     turned = _seen(engine, [Probe(load.axes, load.axes_own, (0.0, 0.0, 0.0))], state)
@@ -100,7 +103,7 @@ def _dead(
 
 
 def _held(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumbers:
-    """A spring whose tension is that of the state."""
+    """Spring with the constant tension of the state."""
     length, rate = spring_length(engine, spring, state)
     stiffness, rest, damping = spring.p
     effort = -stiffness * (length - rest) - damping * rate
@@ -113,7 +116,7 @@ def _held(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumb
 
 
 def spring_length(engine: LoopedEngine, spring: ForceNumbers, state: State) -> tuple[float, float]:
-    """Length (m) of a spring at a state, and its rate."""
+    """Length (m) and rate (m/s) of a spring at a state."""
     seen = _seen(engine, [Probe(*end) for end in spring.ends], state)
     apart, moving = seen[1, 0:3] - seen[0, 0:3], seen[1, 3:6] - seen[0, 3:6]
     length = float(np.linalg.norm(apart))
@@ -121,13 +124,13 @@ def spring_length(engine: LoopedEngine, spring: ForceNumbers, state: State) -> t
 
 
 def bushing_deflection(engine: LoopedEngine, bushing: ForceNumbers, state: State) -> Array:
-    """(6,) deflection of a bushing at a state, in its own axes."""
+    """Deflection (6,) of a bushing at a state, in its own axes."""
     rest, end = _seen(engine, [Probe(*one) for one in bushing.ends], state)
     return deflection_of((rest[None], end[None]))[0]
 
 
 def _seen(engine: LoopedEngine, probes: list[Probe], state: State) -> Array:
-    """(probes, 24) numbers of `Observation.points` at a state."""
+    """Values (probes, 24) of `Observation.points` at a state."""
     found = engine.observe(
         np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None], probes,
         parts=("points",),

@@ -1,4 +1,4 @@
-"""What harmonic pushes do: efforts, and of drives the motion of their own coordinates."""
+"""Effort columns of harmonic inputs, and the motion of driven coordinates."""
 
 from __future__ import annotations
 
@@ -21,8 +21,14 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class HarmonicLoads:
-    """What pushes (p,) do: columns (c, nu) of efforts, each times a power of s and part of one of
-    the pushes; a drive has several, for it moves its coordinate besides."""
+    """Effort columns of harmonic inputs.
+
+    Attributes:
+        pushes: (p,) inputs.
+        columns: (c, nu) efforts; a drive has several columns because it also moves its coordinate.
+        powers: (c,) power of s that multiplies each column.
+        parts: (c, p) assignment of columns to inputs.
+    """
 
     pushes: Sequence[Channel]
     columns: Array
@@ -33,7 +39,7 @@ class HarmonicLoads:
     def of(
         cls, linear: LinearEquations, pushes: Sequence[Channel], efforts: Array
     ) -> HarmonicLoads:
-        """Of efforts (p, nu), of drives those of their accelerations."""
+        """Columns from efforts (p, nu) of the inputs; for drives, of their accelerations."""
         columns, owners = list(efforts), list(range(len(pushes)))
         powers = [2 - one.drive if one.drive >= 0 else 0 for one in pushes]
         for j, one in enumerate(pushes):
@@ -47,14 +53,16 @@ class HarmonicLoads:
         return cls(pushes, wide, np.array(powers, dtype=np.int64), parts)
 
     def summed(self, s: Complex, answers: Complex) -> Complex:
-        """(k, outputs, p) of answers (k, outputs, c) to the columns alone."""
+        """Responses (k, outputs, p) to the inputs from responses (k, outputs, c) to the columns."""
         if len(self.columns) == len(self.pushes) and not self.powers.any():
             return answers
         return (answers * s[:, None, None] ** self.powers) @ self.parts
 
     def carried(self, rows: Array) -> dict[int, tuple[int, Array]]:
-        """Place of a push -> power of s and (outputs,): what outputs have of the motion of its own
-        drive."""
+        """Direct contribution of the motion of drives to outputs.
+
+        Maps the index of an input to a power of s and a column (outputs,).
+        """
         found = {}
         for j, one in enumerate(self.pushes):
             if one.moves:
@@ -64,7 +72,7 @@ class HarmonicLoads:
 
 
 def _placed(linear: LinearEquations, x: Array) -> Array:
-    """(nu,) entries of x (n,) in the places of its speeds."""
+    """Vector (nu,) with the entries of x (n,) at the indices of its speeds."""
     found = np.zeros(linear.model.nu)
     found[list(linear.free)] = x
     return found

@@ -1,12 +1,11 @@
-"""Where a linear model is pushed: efforts, forces and moments at ends, accelerations of the ground,
-inputs of the scene.
+"""Inputs of linear models: efforts, loads at ends, ground accelerations, inputs of the scene.
 
-The residual is linear in whatever acts, so that a column is the difference of two residuals of the
-tree at rest under nothing else, without error.  By duality the column of a force at a point along n
-is also how far the point goes along n with each coordinate.
+The residual is linear in applied loads, so that a column is the exact difference of two residuals
+of the tree at rest without other loads.  By duality the column of a force at a point along n is
+also the displacement of the point along n per unit of each coordinate.
 
-What an input changes is the derivative of the residual by it: by time, where the input goes by time
-at a unit's rate, less that where it stands still.
+The column of an input of the scene is the derivative of the residual with respect to it: the time
+derivative with the input changing at unit rate, less that with a constant input.
 """
 
 from __future__ import annotations
@@ -40,16 +39,24 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
 
 _AXES = "xyz"
-#: What pushes at an end, by the letter of its short name.
+#: Loads at an end and their units, by the letter of the short name.
 _KINDS = {"f": ("force", "N"), "m": ("moment", "N*m")}
 GROUND = tuple(f"ground.acceleration.{axis}" for axis in _AXES)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One push: its name, unit, and which place pushes: `speed`, or `end` with `kind` and `axis`,
-    or the place of an `input` or of a `spring` among all; an acceleration of the ground where there
-    is none.  Where drives move, `moves` says which, and `drive` how often they are differentiated.
+    """Input channel of a linear model.
+
+    Attributes:
+        name, unit: of the channel.
+        speed: index of the speed of an effort, or -1.
+        end, kind, axis: end, "force" or "moment", and axis index of a load at an end; `axis` is
+            also that of a ground acceleration, which has none of the other attributes.
+        input: index of an input of the scene, or -1.
+        spring: index of a spring with an effort, or -1.
+        drive: order of the time derivative of a motion of drives, or -1.
+        moves: drives that follow the channel, with factors.
     """
 
     name: str
@@ -65,7 +72,7 @@ class Channel:
 
 
 def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
-    """A list of names; SceneError for anything else."""
+    """Validated list of names; SceneError for anything else."""
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise SceneError(f'{what} = {names!r}: expected a list of names, such as ["{names}"]')
     if not all(isinstance(name, str) for name in names):
@@ -74,14 +81,17 @@ def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
 
 
 def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
-    """The same with at least one."""
+    """Validated list of at least one name; SceneError for anything else."""
     if not names_of(what, names):
         raise SceneError(f"{what} is empty: leave it out, or name some")
     return names
 
 
 def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tuple[Channel, ...]:
-    """The pushes of a list of names, as matrices take them: of drives the accelerations."""
+    """Channels of a list of names for matrices; of drives only accelerations are accepted.
+
+    Raises SceneError for other motions of drives.
+    """
     found = tuple(channel(model, name) for name in names_of(what, names))
     for one in found:
         if 0 <= one.drive < 2:
@@ -94,7 +104,7 @@ def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tup
 
 
 def inputs_of(model: CompiledScene) -> list[str]:
-    """Inputs of the scene, but those that drive: they are motions and no pushes."""
+    """Inputs of the scene except those of drives, which are motions and not loads."""
     if not model.scene.input:
         return []
     driving = {name for one in active_expressions(model.scene) if one.drive for name in one.inputs}
@@ -102,11 +112,14 @@ def inputs_of(model: CompiledScene) -> list[str]:
 
 
 def channel(model: CompiledScene, name: str) -> Channel:
-    """The push of a name: "shoulder.effort" (of hinges with several speeds "ball.effort_wx"),
-    "boom.tip.force.x" or short "boom.tip.fx", "boom.tip.moment.z" or "boom.tip.mz" (inertial axes),
-    "ground.acceleration.y", or an input of the scene.
+    """Channel of a name.
 
-    Raises SceneError for a name that is none of these, and for an input that drives.
+    Names are "shoulder.effort" ("ball.effort_wx" for hinges with several speeds), "strut.effort" of
+    a spring, "boom.tip.force.x" or short "boom.tip.fx", "boom.tip.moment.z" or "boom.tip.mz"
+    (inertial axes), "ground.acceleration.y", a motion of a drive, or an input of the scene.
+
+    Raises SceneError for an unknown name, an effort on a driven speed, and an input that drives
+    follow but other expressions also read.
     """
     owner, _, last = name.rpartition(".")
     given = next((one for one in model.scene.input if one.name == name), None)
@@ -151,7 +164,7 @@ def channel(model: CompiledScene, name: str) -> Channel:
 
 
 def _following(model: CompiledScene, given: Input) -> Channel:
-    """An input that drives follow: the motion of these."""
+    """Channel of an input that drives follow: the motion of these drives."""
     pushing = [
         x.what for x in active_expressions(model.scene) if given.name in x.inputs and not x.drive
     ]
@@ -186,13 +199,13 @@ def _efforts(model: CompiledScene) -> list[str]:
 def columns(
     engine: LoopedEngine, state: State, channels: Sequence[Channel], free: list[int]
 ) -> Array:
-    """(free, channels): efforts in the free speeds of a unit of each push."""
+    """Efforts (free, channels) along the free speeds per unit of each channel."""
     if not channels:
         return np.zeros((len(free), 0))
     still, memory = np.zeros(engine.nu), engine.start_memory()
 
     def beyond(of: LoopedEngine) -> Array:
-        """Efforts that it needs at rest beyond those of the same tree under nothing."""
+        """Required efforts at rest in excess of those of the unloaded tree."""
         bare, loaded = (
             each.inverse_dynamics(state.t, state.q, still, still, memory)
             for each in (engine.inertia_alone, of)
@@ -219,8 +232,7 @@ def columns(
 
 
 def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
-    """How the residual (nu,) changes with time where all inputs stand still at their values but
-    one, which goes at this rate."""
+    """Time derivative (nu,) of the residual with constant inputs except one of the given rate."""
     system = engine.packed.system
     inputs = [
         PiecewisePolynomial(
@@ -237,10 +249,10 @@ def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
 
 
 def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
-    """The tree under a unit of one push at an end alone."""
+    """Engine of the tree with a unit load of the channel at an end as the only load."""
     packed = engine.packed
     body, _, offset = packed.end(push.end)
-    system = packed.system.awake(body)  # nothing else may hang or act on this end
+    system = packed.system.awake(body)  # the end may have no other element
     unit = np.eye(3)[push.axis].tolist()
     nothing, own = (-1, -1, -1), (0, 1, 2)
     force = push.kind == "force"
@@ -255,7 +267,7 @@ def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
 
 
 def _stretched(engine: LoopedEngine, number: int) -> LoopedEngine:
-    """The tree under a unit effort of one spring alone."""
+    """Engine of the tree with a unit effort of one spring as the only load."""
     packed, system = engine.packed, engine.packed.system
     constant = constant_kernel("effort", system, [1.0])
     spring = replace(

@@ -1,8 +1,8 @@
-"""Lanczos' method with the inverse of K - sigma M, in the inner product of M.
+"""Lanczos iteration with the inverse of K - sigma M, in the inner product of M.
 
-Every step is one solution and one product.  All vectors are kept orthogonal, against each other and
-against motions that are known, so that another run finds what the first one missed: of motions with
-equal frequencies it sees one.
+Each step needs one solution and one product.  All vectors are orthogonalised against each other and
+against known modes.  A run finds only one of several modes with equal frequencies; further runs
+find the others.
 """
 
 from __future__ import annotations
@@ -17,17 +17,18 @@ from mstmm.errors import NumericalFailure
 
 from .matrix_operators import Pencil
 
-#: Residuals of motions that are found, in parts of 1/(omega^2 - sigma).
+#: Largest residual of a converged mode, relative to 1/(omega^2 - sigma).
 _CLOSE = 1e-9
-#: What is left of a vector is rounding below this part of it.
+#: Remainder of a vector that is rounding, relative to the vector.
 _NOTHING = 1e-13
-#: Steps between looks at what is found, most vectors for each motion wanted, and most runs.
+#: Steps between convergence checks, vectors per requested mode, additional vectors, largest number
+#: of runs.
 _LOOK, _VECTORS, _ROOM, _RUNS = 4, 4, 60, 30
 
 
 @dataclass(frozen=True)
 class ConvergedPairs:
-    """omega^2 (k,) rising, shapes (n, k) with unit modal mass, and M times them as rows (k, n)."""
+    """Ascending omega^2 (k,), shapes (n, k) of unit modal mass, and M times them as rows (k, n)."""
 
     squares: Array
     shapes: Array
@@ -35,11 +36,11 @@ class ConvergedPairs:
 
     @classmethod
     def none(cls, n: int) -> ConvergedPairs:
-        """Nothing yet."""
+        """Empty set of pairs for n coordinates."""
         return cls(np.zeros(0), np.zeros((n, 0)), np.zeros((0, n)))
 
     def joined(self, squares: Array, shapes: Array, pushed: Array) -> ConvergedPairs:
-        """With others, that rise."""
+        """Merge with other ascending pairs."""
         if not len(self.squares):
             return ConvergedPairs(squares, shapes, pushed)
         every = np.concatenate([self.squares, squares])
@@ -54,10 +55,11 @@ class ConvergedPairs:
 def slowest(
     pencil: Pencil, wanted: int, sigma: float, edge: float, trial: int, known: ConvergedPairs
 ) -> ConvergedPairs:
-    """Those that are known and, beside them, the `wanted` motions with omega^2 next to sigma, or
-    fewer if one of them lies beyond `edge` already.
+    """Known modes and `wanted` further modes with omega^2 nearest to sigma.
 
-    Raises NumericalFailure where the iteration does not find them.
+    There are fewer if one of them already has omega^2 above `edge`.
+
+    Raises NumericalFailure if the iteration does not converge.
     """
     pencil.factor(-sigma)
     start = pencil.solve(np.random.default_rng(trial).standard_normal(len(pencil)))
@@ -78,12 +80,14 @@ def slowest(
 
 
 class _Run:
-    """A sequence of vectors q_j (rows of `q`, M q_j in `p`), orthogonal in M, in which the inverse
-    is tridiagonal: `alpha`, and `beta` beside it.
+    """Lanczos run: M-orthonormal vectors in which the inverse is tridiagonal.
 
     Attributes:
-        values, shapes, pushed: 1/(omega^2 - sigma) of what is found, shapes and M times them.
-        rest: where another run begins; `ended` says that there is no other.
+        q, p: vectors q_j and M q_j as rows.
+        alpha, beta: diagonal and off-diagonal of the tridiagonal matrix.
+        values, shapes, pushed: 1/(omega^2 - sigma) of the modes found, shapes and M times them.
+        rest: start vector of the next run.
+        ended: whether the space is exhausted.
     """
 
     def __init__(self, pencil: Pencil, known: ConvergedPairs, start: Array) -> None:
@@ -95,8 +99,11 @@ class _Run:
         self.ended = False
 
     def go(self, wanted: int, least: float) -> None:
-        """Steps until that many are found, in order, or one with 1/(omega^2 - sigma) below `least`,
-        or there is no room for more vectors."""
+        """Iterate until `wanted` modes are found in order.
+
+        Stop early at a mode with 1/(omega^2 - sigma) below `least`, or without space for further
+        vectors.
+        """
         n = len(self.pencil)
         room = min(n - len(self.known.squares), _VECTORS * wanted + _ROOM)
         self.q, self.p = np.empty((room, n)), np.empty((room, n))
@@ -109,7 +116,7 @@ class _Run:
                 return
 
     def _step(self) -> None:
-        """The inverse times the last vector, and what is new in it."""
+        """Multiply the last vector by the inverse and append the new direction."""
         j = len(self.alpha)
         w = self.pencil.solve(self.p[j])
         size = float(np.linalg.norm(w))
@@ -120,7 +127,10 @@ class _Run:
         self.beta.append(self._next(w, size))
 
     def _next(self, w: Array, size: float) -> float:
-        """The next vector, orthogonal to all others, and what is left of w; its size was `size`."""
+        """Append w, made orthogonal to all vectors; return the M-norm of the remainder.
+
+        `size` is the norm of w before orthogonalisation.
+        """
         j = len(self.alpha)
         for known, pushed in ((self.known.shapes.T, self.known.pushed), (self.q[:j], self.p[:j])):
             w = w - (pushed @ w) @ known
@@ -133,7 +143,7 @@ class _Run:
         return left
 
     def _look(self, wanted: int, least: float) -> bool:
-        """Whether the run is at its end, and what it found."""
+        """Check convergence; at the end of the run store the modes found and return True."""
         steps = len(self.alpha)
         values, weights = eigh_tridiagonal(self.alpha, self.beta[:-1])
         order = np.argsort(-np.abs(values), kind="stable")

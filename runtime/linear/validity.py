@@ -124,7 +124,7 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
 
 
 def changing_risk(linear: LinearEquations, name: str) -> Risk:
-    """Risk of an input whose column changes along the motion or with time."""
+    """Risk of an input column or output row that changes along the motion or with time."""
     return Risk(
         "changing-input", f'input "{name}"',
         f"{name} changes its effect along the motion of this state or with time: the model has "
