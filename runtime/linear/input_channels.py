@@ -1,4 +1,4 @@
-"""Inputs of linear models: efforts, loads at ends, ground accelerations, inputs of the scene.
+"""Inputs of linear models: efforts, loads at ends, ground accelerations, scene inputs.
 
 The residual is linear in applied loads, so that a column is the exact difference of two residuals
 of the tree at rest without other loads.  By duality the column of a force at a point along n is

@@ -87,7 +87,7 @@ class _Run:
         alpha, beta: diagonal and off-diagonal of the tridiagonal matrix.
         values, shapes, pushed: 1/(omega^2 - sigma) of the modes found, shapes and M times them.
         rest: start vector of the next run.
-        ended: whether the space is exhausted.
+        ended: whether no further vector, and no next run, exists.
     """
 
     def __init__(self, pencil: Pencil, known: ConvergedPairs, start: Array) -> None:

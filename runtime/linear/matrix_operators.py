@@ -1,9 +1,9 @@
-"""M, C and K of a scene as operators: products and solutions in O(bodies), no matrix.
+"""M, C and K of a scene as operators: products and solutions in O(bodies) without matrices.
 
     Z(s) = s^2 M + s C + K
 
-is the tangent of an implicit step whose acceleration is s^2 x and whose speed is s x, so that the
-sweep that factors the one factors the other.
+is the tangent matrix of an implicit step with acceleration s^2 x and speed s x, so that the same
+sweep factors both.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .mck_matrices import State
 
 
 class Pencil:
-    """The operators on the n free speeds of one scene at rest at a state.  One thread."""
+    """Operators M, C, K on the n free speeds of a scene at rest at a state.  Not thread-safe."""
 
     def __init__(self, engine: LoopedEngine, state: State, free: list[int]) -> None:
         self.tangent, self.free = TangentMatrix(engine), np.array(free, dtype=np.int64)
@@ -44,7 +44,7 @@ class Pencil:
         return whole
 
     def mass(self, x: Array) -> Array:
-        """M x: the efforts of inertia alone, at rest."""
+        """Product M x: the inertia efforts at rest."""
         return self._required(self._full(x)) - self._strained
 
     def _required(self, a: Array) -> Array:
@@ -53,24 +53,24 @@ class Pencil:
         return engine.inverse_dynamics(state.t, state.q, self._nothing, a, memory)[self._places]
 
     def damping(self, x: Array) -> Array:
-        """C x."""
+        """Product C x."""
         return self.tangent.slope(0.0, self._no_q, self._full(x), self._nothing)[self._places]
 
     def stiffness(self, x: Array) -> Array:
-        """K x."""
+        """Product K x."""
         moved = self.tangent.rates(self.state.q, self._full(x))
         self._begin()
         return self.tangent.slope(0.0, moved, self._nothing, self._nothing)[self._places]
 
     def skew(self) -> float:
-        """How far K is from symmetric, in parts, along two directions."""
+        """Relative asymmetry of K along two random directions."""
         x, y = np.random.default_rng(0).standard_normal((2, len(self)))
         first, second = self.stiffness(x), self.stiffness(y)
         size = float(np.linalg.norm(first) * np.linalg.norm(y))
         return abs(float(y @ first - x @ second)) / size if size else 0.0
 
     def factor(self, square: float, rate: float = 0.0) -> None:
-        """Factor square M + rate C + K.  NumericalFailure where that is singular."""
+        """Factor square M + rate C + K; NumericalFailure if it is singular."""
         if self._factored != (square, rate):
             self._factored = None
             self._begin()
@@ -78,5 +78,5 @@ class Pencil:
             self._factored = square, rate
 
     def solve(self, r: Array) -> Array:
-        """x of the last factorisation: (square M + rate C + K) x = r."""
+        """Solution x of (square M + rate C + K) x = r with the last factorisation."""
         return self.tangent.solve(self._full(r))[self._places]

@@ -1,12 +1,12 @@
-"""M, C and K of a packed scene about a state: the residual of its equations, differentiated.
+"""M, C and K of a packed scene about a state: derivatives of the residual of its equations.
 
-R(t, q, u, a) are the efforts that the accelerations a need beyond everything that acts (inverse
-dynamics).  Along tangent increments, dq = N(q) dphi where qdot = N(q) u, it changes by
+R(t, q, u, a) are the efforts that the accelerations a require in addition to all applied loads
+(inverse dynamics).  For tangent increments, dq = N(q) dphi where qdot = N(q) u,
 
     dR = M da + C du + K dphi,      M = R_a,   C = R_u,   K = R_q N.
 
-Every column is one directional derivative of the recursion, exact, O(bodies)
-(derive/schedule/tangent_sweep.py); no difference is taken.
+Each column is one exact directional derivative of the recursion, O(bodies)
+(derive/schedule/tangent_sweep.py), not a finite difference.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ..engine.tangent_matrix import thread_tangent
 
 @dataclass(frozen=True)
 class State:
-    """Time (s), coordinates (nq,), speeds (nu,) and accelerations (nu,) to make linear about."""
+    """Operating point: time (s), coordinates (nq,), speeds (nu,) and accelerations (nu,)."""
 
     t: float
     q: Array
@@ -36,7 +36,7 @@ class State:
 
 @dataclass(frozen=True)
 class Matrices:
-    """M, C, K (n, n) of the n speeds that nobody imposes; rows N or N*m."""
+    """M, C, K (n, n) of the n speeds without prescribed motion; rows in N or N*m."""
 
     M: Array
     C: Array
@@ -44,7 +44,7 @@ class Matrices:
 
 
 def matrices(engine: LoopedEngine, state: State, free: Sequence[int]) -> Matrices:
-    """The matrices of a packed scene.  NumericalFailure where the state cannot be evaluated."""
+    """Matrices of a packed scene; NumericalFailure if the state cannot be evaluated."""
     found = thread_tangent(engine).matrices(state.t, state.q, state.u, state.a, free)
     if not np.isfinite(found).all():
         raise _no_slope(engine, state)

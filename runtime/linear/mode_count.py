@@ -1,14 +1,14 @@
-"""How many natural motions an undamped scene has below a frequency.
+"""Number of modes of an undamped scene below a frequency.
 
-As many omega^2 are below a number as K - square M has negative eigenvalues, and those of a tree
-are those of the pivots of its sweep (Sylvester; Wittrick and Williams, Q. J. Mech. Appl. Math. 24
-(1971) 263-284).
+The number of omega^2 below `square` is the number of negative eigenvalues of K - square M, which
+for a tree is that of the pivots of its sweep (Sylvester; Wittrick and Williams, Q. J. Mech. Appl.
+Math. 24 (1971) 263-284).
 
-The pivots do not see springs between bodies.  Let A be K - square M and T the same of the tree with
-these springs taken apart (`with_springs_grounded`): both are symmetric where loads have a
-potential, and A - T has low rank.  Where the columns of W span T^-1 (A - T), A x = T x for every x
-with W^T T x = 0, so that nothing couples such x with W (Haynsworth, Linear Algebra Appl. 1 (1968)
-73-81):
+The pivots do not include the coupling by springs between bodies.  Let A be K - square M and T the
+same matrix of the tree with these springs connected to the ground (`with_springs_grounded`).  Both
+are symmetric if loads have a potential, and A - T has low rank.  If the columns of W span
+T^-1 (A - T), then A x = T x for every x with W^T T x = 0, so that such x are not coupled with W
+(Haynsworth, Linear Algebra Appl. 1 (1968) 73-81):
 
     negative(A) = negative(T) + negative(W^T A W) - negative(W^T T W).
 """
@@ -24,14 +24,15 @@ from mstmm.array_validation import Array
 from .frozen_loads import with_springs_grounded
 from .matrix_operators import Pencil
 
-#: Directions in which two bodies can pull each other.
+#: Upper bound of the rank of the stiffness of one spring between two bodies.
 _WAYS = 12
-#: Columns that others make up to this part are no more; matrices that far from symmetric are none.
+#: Relative size below which a column is linearly dependent, and relative asymmetry above which a
+#: matrix does not count as symmetric.
 _NEW, _SYMMETRIC = 1e-12, 1e-6
 
 
 class Counting:
-    """Counts of motions of one scene."""
+    """Counter of the modes of one scene."""
 
     def __init__(self, pencil: Pencil) -> None:
         self.whole = self.tree = pencil
@@ -40,8 +41,10 @@ class Counting:
             self.tree = Pencil(apart, pencil.state, pencil.free.tolist())
 
     def below(self, square: float) -> int | None:
-        """How many omega^2 are below `square`; None where loads reach across the tree that are no
-        springs, or have no potential."""
+        """Number of omega^2 below `square`.
+
+        None if loads other than springs couple branches of the tree, or have no potential.
+        """
         efforts = self._efforts
         self.tree.factor(-square)
         found = self.tree.tangent.count_negative()
@@ -52,8 +55,10 @@ class Counting:
 
     @cached_property
     def _efforts(self) -> Array:
-        """(n, r) efforts that springs give across the tree, whatever moves: found by moving all at
-        random, as often as they have ways to pull."""
+        """Basis (n, r) of the coupling efforts of springs between bodies.
+
+        It is found from random displacements, as many as the rank of the coupling can be.
+        """
         n = len(self.whole)
         if self.tree is self.whole:
             return np.zeros((n, 0))
@@ -62,8 +67,7 @@ class Counting:
         return _basis([self.whole.stiffness(x) - self.tree.stiffness(x) for x in moves])
 
     def _more(self, square: float, w: Array) -> int | None:
-        """How many more eigenvalues of A are negative than of T; None where either is not
-        symmetric."""
+        """Number of negative eigenvalues of A less that of T; None if either is not symmetric."""
         found = []
         for pencil in (self.whole, self.tree):
             pressed = [pencil.stiffness(x) - square * pencil.mass(x) for x in w.T]
@@ -75,6 +79,6 @@ class Counting:
 
 
 def _basis(columns: list[Array]) -> Array:
-    """(n, r) orthonormal, of columns (n,)."""
+    """Orthonormal basis (n, r) of columns (n,)."""
     left, sizes, _ = np.linalg.svd(np.array(columns).T, full_matrices=False)
     return left[:, sizes > _NEW * sizes.max(initial=0)]

@@ -1,4 +1,4 @@
-"""The motions of a linear model, from its matrices or, of many, by its operators."""
+"""Mode solvers of a linear model: dense matrices, or operators for large models."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from .modes import Modes
 if TYPE_CHECKING:
     from .linear_equations import LinearEquations
 
-#: More coordinates than this have their slowest motions found without a matrix.
+#: Number of coordinates above which the slowest modes are computed without matrices.
 _DENSE = 400
-#: A stiffness further from symmetric than this, in parts, is not that of a potential.
+#: Relative asymmetry above which a stiffness does not derive from a potential.
 _SYMMETRIC = 1e-9
-#: Rates in parts of the fastest that are rounding: eigenvalues are found to its square.
+#: Rates that are rounding, relative to the largest: the error of omega^2 is its square.
 _ROUNDING = 1e-7
 
 
 def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Modes:
-    """See `Linear.modes`."""
+    """Modes of a linear model; see `Linear.modes`."""
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
     few = few and linear.mechanism is None and linear.carrying is None
     if count is None or not few or linear.turning is not None:
@@ -48,7 +48,7 @@ def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
 
 
 def _dense(linear: LinearEquations, damped: bool | None) -> Modes:
-    """All motions, from the matrices."""
+    """All modes, from the matrices."""
     with_c = linear.C.any() if damped is None else damped
     if with_c or not _from_potential(linear.K):
         return _general(linear, linear.C if with_c else np.zeros_like(linear.C))
@@ -58,7 +58,7 @@ def _dense(linear: LinearEquations, damped: bool | None) -> Modes:
 def _ordered(
     linear: LinearEquations, squares: Array, shapes: Array, complete: bool | None
 ) -> Modes:
-    """Of omega^2; below 0 a motion grows and another decays, and the growing one is told."""
+    """Modes from omega^2; a negative value gives the growing one of its two motions."""
     rates = np.sqrt(np.abs(squares))
     values = np.where(squares < 0, rates + 0j, 1j * rates)
     order = np.argsort(rates, kind="stable")
@@ -81,7 +81,7 @@ def _symmetric(linear: LinearEquations) -> tuple[Array, Array]:
 
 
 def _general(linear: LinearEquations, c: Array) -> Modes:
-    """The quadratic problem, made linear."""
+    """Modes of the quadratic eigenvalue problem, reduced to first order."""
     n = len(linear)
     zero, one = np.zeros((n, n)), np.eye(n)
     a = np.block([[zero, one], [-linear.K, -c]])

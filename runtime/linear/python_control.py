@@ -1,4 +1,4 @@
-"""Linear models for python-control (extra: control), with names of states, inputs and outputs."""
+"""Conversion of linear models to python-control (extra: control), with signal names."""
 
 from __future__ import annotations
 
@@ -20,8 +20,10 @@ from .state_space import StateSpace
 def output_matrices(
     linear: StateSpace, outputs: Sequence[str] | None, pushes: Sequence[Channel], b: Array
 ) -> tuple[tuple[str, ...], Array, Array]:
-    """(names, C (outputs, states), D (outputs, pushes)) of y = C z + D v, where `b` (states,
-    pushes) is what v adds to d/dt z."""
+    """Output names, C (outputs, states) and D (outputs, pushes) of y = C z + D v.
+
+    `b` (states, pushes) is the input matrix of d/dt z.
+    """
     named = None if outputs is None else some_names("outputs", outputs)
     shown = outputs_of(linear, named)
     refuse_turning_outputs(linear, shown)
@@ -30,7 +32,7 @@ def output_matrices(
 
 
 def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: bool) -> Any:
-    """See `Linear.to_control`."""
+    """Model as a `control.StateSpace`; see `Linear.to_control`."""
     try:
         import control
     except ImportError as error:
@@ -50,5 +52,5 @@ def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: 
 
 
 def _signal(name: str) -> str:
-    """A dot parts the names of systems and signals there."""
+    """Signal name without dots, which separate system and signal names in python-control."""
     return name.replace(".", "_").replace("[", "_").replace("]", "")

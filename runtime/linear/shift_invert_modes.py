@@ -1,11 +1,10 @@
-"""The slowest motions of many bodies, by shift and invert over the O(bodies) solution.
+"""Slowest modes of large models, by shift-and-invert iteration with the O(bodies) solution.
 
     (K - sigma M)^-1 M x = x / (omega^2 - sigma)
 
-has the motions with omega^2 next to sigma first (Ericsson and Ruhe, Math. Comp. 35 (1980)
-1251-1268), and the pivots of one more factorisation count how many there are, so that none of an
-undamped scene is missed.  Damped motions come from the inverse of the first-order problem,
-uncounted.
+yields the modes with omega^2 nearest to sigma first (Ericsson and Ruhe, Math. Comp. 35 (1980)
+1251-1268).  The pivots of one more factorisation count the modes, so that none of an undamped scene
+is missed.  Damped modes result from the inverse of the first-order problem and are not counted.
 """
 
 from __future__ import annotations
@@ -25,26 +24,28 @@ from .lanczos_iteration import ConvergedPairs, slowest
 from .matrix_operators import Pencil
 from .mode_count import Counting
 
-#: Motions looked for beyond those asked for, so that the count has a gap behind the last one.
+#: Additional modes, so that the count finds a gap above the last requested one.
 _BEYOND = 2
-#: Parts of the fastest omega^2 by which a scene that nothing holds may be shifted.
+#: Candidate shifts for an unrestrained scene, relative to the largest omega^2.
 _SHIFTS = tuple(10.0**-k for k in range(24, 1, -1))
-#: Which of them is taken where motions are not counted.
+#: Index of the shift that is used if modes are not counted.
 _UNCOUNTED = 12
-#: Efforts that a solution leaves, in parts, where the factors are no rounding.
+#: Largest relative residual of a solution with a usable factorisation.
 _NOISE = 1e-6
-#: Parts of that shift that are rounding: omega^2 of motions that nothing holds.
+#: Fraction of the shift below which omega^2 is rounding, as for unrestrained modes.
 _ROUNDING = 1e-2
-#: Searches at most; each finds one more of motions with equal frequencies.
+#: Largest number of searches; each finds one more of several modes with equal frequencies.
 _TRIALS = 12
-#: omega^2 that are told apart by a count, in parts of the larger.
+#: Smallest gap between omega^2 that a count can separate, relative to the larger.
 _GAP = 1e-9
 
 
 @dataclass(frozen=True)
 class LowestModes:
-    """omega^2 (k,) or eigenvalues, shapes (n, k), and whether none is missing below the last (None:
-    not counted)."""
+    """Slowest modes: omega^2 or eigenvalues (k,) and shapes (n, k).
+
+    `complete` says whether no mode below the last one is missing; None if not counted.
+    """
 
     values: NDArray[Any]
     shapes: NDArray[Any]
@@ -52,7 +53,7 @@ class LowestModes:
 
 
 def undamped_modes(pencil: Pencil, count: int) -> LowestModes:
-    """The `count` motions of least omega^2 of M and a symmetric K."""
+    """The `count` modes of smallest omega^2 of M and a symmetric K."""
     n, counting = len(pencil), Counting(pencil)
     wanted, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
     found, edge, values = ConvergedPairs.none(n), np.inf, np.zeros(0)
@@ -65,15 +66,14 @@ def undamped_modes(pencil: Pencil, count: int) -> LowestModes:
             complete = None if counted is None else True
             return LowestModes(values[:count], found.shapes[:, :count], complete)
         wanted = counted - kept
-        if counted < kept:  # some were found that are none: nearer to the shift they tell apart
+        if counted < kept:  # spurious modes were found: repeat with a shift that separates them
             found, sigma = ConvergedPairs.none(n), min(sigma, edge - abs(edge))
             wanted, edge = min(count + _BEYOND, n - 1), np.inf
     return LowestModes(values[:count], found.shapes[:, :count], False)
 
 
 def _gap(values: Array, count: int) -> tuple[int, float]:
-    """How many of the values found are below a number between two of them, from the last that was
-    asked for on, and that number."""
+    """Number of values below the first gap at or after the last requested one, and its centre."""
     for k in range(max(1, min(count, len(values) - 1)), len(values)):
         below, above = float(values[k - 1]), float(values[k])
         if above - below > _GAP * max(abs(above), abs(below)):
@@ -83,8 +83,11 @@ def _gap(values: Array, count: int) -> tuple[int, float]:
 
 
 def _shift(pencil: Pencil, counting: Counting) -> float:
-    """0 where something holds the scene, else below 0: by so much that a factorisation is more than
-    rounding, and by as much more as no motion that something holds is as slow."""
+    """Shift sigma: 0 if the scene is restrained, else negative.
+
+    Its magnitude suffices for a usable factorisation, and is as large as possible below the omega^2
+    of all restrained modes.
+    """
     if _told(pencil, 0.0):
         return 0.0
     shifts = (np.array(_SHIFTS) * _fastest(pencil)).tolist()
@@ -97,7 +100,7 @@ def _shift(pencil: Pencil, counting: Counting) -> float:
 
 
 def _told(pencil: Pencil, shift: float) -> bool:
-    """Whether K + shift M is more than rounding: what it solves, it solves."""
+    """Whether the factorisation of K + shift M is usable: its solution has a small residual."""
     try:
         pencil.factor(shift)
     except NumericalFailure:
@@ -109,9 +112,9 @@ def _told(pencil: Pencil, shift: float) -> bool:
 
 
 def _fastest(pencil: Pencil) -> float:
-    """The size of the larger omega^2: a few powers of M^-1 K."""
+    """Magnitude of the largest omega^2, by a few power iterations with M^-1 K."""
     x = np.random.default_rng(0).standard_normal(len(pencil))
-    pencil.factor(1e30)  # the mass alone
+    pencil.factor(1e30)  # so that M dominates
     for _ in range(2):
         pressed = pencil.stiffness(x / np.linalg.norm(x))
         x = 1e30 * pencil.solve(pressed)
@@ -119,7 +122,7 @@ def _fastest(pencil: Pencil) -> float:
 
 
 def damped_modes(pencil: Pencil, count: int, with_c: bool) -> LowestModes:
-    """The `count` eigenvalues (pairs count as one) next to 0 of M, C (or none) and K."""
+    """The `count` eigenvalues nearest to 0 of M, C (if `with_c`) and K; pairs count once."""
     n, c = len(pencil), pencil.damping if with_c else np.zeros_like
     try:
         pencil.factor(0.0)

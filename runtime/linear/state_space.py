@@ -1,4 +1,4 @@
-"""Linear equations of motion as a first-order system."""
+"""Linear equations of motion as a first-order state-space system."""
 
 from __future__ import annotations
 
@@ -15,30 +15,32 @@ from .outputs.linear_outputs import Rows
 
 
 class StateSpace(LinearEquations):
-    """d/dt z = A z + B v + B_disturbances w of z = (x, x'), and d, d' of the drives behind them
-    whose accelerations are inputs; see `LinearEquations`."""
+    """First-order system d/dt z = A z + B v + B_disturbances w; see `LinearEquations`.
+
+    z = (x, x'), followed by d, d' of drives whose accelerations are inputs.
+    """
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the state (x, x'), or (x, x', d, d')."""
+        """Names of the states (x, x') or (x, x', d, d')."""
         parts = self.coordinates, self.driven
         return tuple(f"{name}{rate}" for names in parts for rate in ("", "'") for name in names)
 
     @property
     def positions(self) -> list[int]:
-        """Places of x and d in the state."""
+        """Indices of x and d in the state."""
         n, k = len(self), len(self.drives)
         return [*range(n), *range(2 * n, 2 * n + k)]
 
     @property
     def velocities(self) -> list[int]:
-        """Places of x' and d' in the state."""
+        """Indices of x' and d' in the state."""
         n, k = len(self), len(self.drives)
         return [*range(n, 2 * n), *range(2 * n + k, 2 * n + 2 * k)]
 
     @cached_property
     def A(self) -> Array:
-        """(2 n + 2 k, 2 n + 2 k) with k drives."""
+        """System matrix (2 n + 2 k, 2 n + 2 k) with k drives."""
         if not self.drives:
             return self._undriven
         found = np.zeros((len(self.states), len(self.states)))
@@ -51,7 +53,7 @@ class StateSpace(LinearEquations):
 
     @property
     def _undriven(self) -> Array:
-        """(2 n, 2 n): d/dt (x, x') where drives stand still."""
+        """System matrix (2 n, 2 n) of (x, x') without motion of drives."""
         if self.about is not None and self.carrying is None:
             found = self.model.slopes.state_matrix(self.about, self.turning is not None)
             if found is not None:
@@ -62,24 +64,26 @@ class StateSpace(LinearEquations):
 
     @cached_property
     def B(self) -> Array:
-        """(2 n + 2 k, inputs)."""
+        """Input matrix (2 n + 2 k, inputs)."""
         return self._pushing(self.controls, self.V)
 
     @cached_property
     def B_disturbances(self) -> Array:
-        """(2 n + 2 k, disturbances): what w adds."""
+        """Input matrix (2 n + 2 k, disturbances) of w."""
         return self._pushing(self.others, self.W)
 
     def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
-        """C (outputs, states) and D (outputs, pushes) of rows of outputs, where `b` (states,
-        pushes) is what pushes add to d/dt z."""
+        """C (outputs, states) and D (outputs, pushes) of output rows.
+
+        `b` (states, pushes) is the input matrix of d/dt z.
+        """
         speeds, rates = [*self.free, *self.drives], self.velocities
         c, d = np.zeros((len(rows.through), len(self.states))), rows.through
         for order, wide in rows.orders.items():
             some = wide[:, speeds]
             if order < 2:
                 c[:, (self.positions, rates)[order]] += some
-            else:  # of accelerations
+            else:  # accelerations
                 c, d = c + some @ self.A[rates], d + some @ b[rates]
         return c, d
 

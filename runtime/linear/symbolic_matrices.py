@@ -1,4 +1,4 @@
-"""Symbolic: the matrices of a linear model as formulas in names that were kept."""
+"""Matrices of a linear model as symbolic expressions in kept names."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 @dataclass(frozen=True, eq=False)
 class SymbolicLinearModel:
-    """M x'' + C x' + K x = V v + W w with SymPy matrices; rows, columns and units as in `Linear`.
+    """M x'' + C x' + K x = V v + W w with SymPy matrices; rows and units as in `Linear`.
 
     Attributes:
-        M, C, K, V, W: `sympy.ImmutableMatrix`, in the symbols that were kept.
+        M, C, K, V, W: `sympy.ImmutableMatrix` in the kept symbols; columns as in `Linear`.
         symbols: `sympy.Symbol` by name.
-        numbers: what each symbol is in the scene or state, SI units; `M.subs(numbers)` is the
+        numbers: value of each symbol in the scene or state, SI units; `M.subs(numbers)` is the
             matrix of the linear model.
         coordinates: names of x.
         inputs, disturbances: names of v and w.

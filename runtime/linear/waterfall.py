@@ -1,4 +1,4 @@
-"""One answer of a scene over the frequency and over a number of the scene: a waterfall."""
+"""Waterfall: one frequency response over frequency and over a parameter of the scene."""
 
 from __future__ import annotations
 
@@ -26,8 +26,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Waterfall(AssessedAnswer):
-    """Amplitudes `values` (m, k) of one output under one input, complex: over a parameter (m,) and
-    omega (k,) in rad/s."""
+    """Frequency response of one output to one input, over a parameter and frequency.
+
+    Attributes:
+        points: (m,) values of the parameter.
+        omega: (k,) angular frequencies, rad/s.
+        values: (m, k) complex amplitudes.
+    """
 
     parameter: str
     points: Array = field(repr=False)
@@ -38,7 +43,7 @@ class Waterfall(AssessedAnswer):
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure`: magnitudes in dB as colours; written where `path` is given.
+        """Magnitudes in dB as colours in a `matplotlib.figure.Figure`, written to `path` if given.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
@@ -48,7 +53,7 @@ class Waterfall(AssessedAnswer):
         return waterfall(frequency, self.points[up], self.values[up], self.parameter, path)
 
     def to_dataset(self) -> Any:
-        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
         along = ("value", "omega")
         arrays: dict[str, Any] = {
             "real": (along, self.values.real), "imag": (along, self.values.imag),
@@ -60,7 +65,7 @@ class Waterfall(AssessedAnswer):
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        """A row for each value of the parameter and each frequency."""
+        """Header, then one row per parameter value and frequency."""
         yield self.parameter, "omega [rad/s]", "frequency [Hz]", "magnitude", "phase [rad]"
         for point, row in zip(self.points.tolist(), self.values, strict=True):
             for omega, value in zip(self.omega.tolist(), row.tolist(), strict=True):
@@ -68,9 +73,9 @@ class Waterfall(AssessedAnswer):
                 yield tuple(map(repr, numbers))
 
     def save(self, path: str | Path) -> Path:
-        """All of it: .nc (extra io) or .csv, a row for each value and frequency.
+        """Save the responses: .nc (extra io), or .csv with one row per value and frequency.
 
-        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
         return file_formats.save(path, self.to_dataset, self._rows())
 
@@ -82,9 +87,9 @@ def waterfall(
     omega: ArrayLike,
     names: Sequence[str],
 ) -> Waterfall:
-    """The answer at each value of the parameter; `names` of input and output.
+    """Frequency response at each parameter value; `names` are those of input and output.
 
-    Raises SceneError for what is not one name.
+    Raises SceneError unless each is a single name.
     """
     pushed, shown = names
     for what, name in (("input", pushed), ("output", shown)):
