@@ -1,1 +1,1 @@
-"""Operating points of linear models: dry friction there, and whether they last."""
+"""Operating points of linear models: dry friction, steadiness, and changes along the motion."""

@@ -1,4 +1,4 @@
-"""What changes along the motion of an operating point: matrices, effects of inputs, outputs."""
+"""Changes of matrices, inputs and outputs along the motion of an operating point."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from .later import LaterStates
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: The name of M, C and K among what changes.
+#: Name of M, C and K in the results of `find_changes`.
 MATRICES = "the matrices"
-#: Changes that count as none: in parts of their own rows, of the largest entry, and of a unit.
+#: Negligible changes relative to rows and columns, relative to the largest entry, and absolute.
 _SAME, _FAINT, _ROUNDING = 1e-6, 1e-9, 1e-12
 
 
@@ -31,7 +31,7 @@ def find_changes(
     pushes: Sequence[Channel],
     shown: Sequence[LinearQuantity] = (),
 ) -> list[str]:
-    """What changes along the motion: `MATRICES`, and names of pushes and outputs."""
+    """Names of inputs and outputs that change along the motion, and `MATRICES` if these do."""
     names, changing = [one.name for one in shown], dict[str, None]()
     if not later.sparse:
         return []
@@ -48,7 +48,7 @@ def find_changes(
 
 
 def _effects(linear: LinearEquations, pushes: Sequence[Channel]) -> list[Array]:
-    """Of each push what a unit of it, and of the motion of its drive, does."""
+    """Effort columns per unit of each input, including those of the motion of its drive."""
     if not pushes:
         return []
     efforts = np.zeros((len(pushes), linear.model.nu))
@@ -60,8 +60,11 @@ def _effects(linear: LinearEquations, pushes: Sequence[Channel]) -> list[Array]:
 def _rows(
     linear: LinearEquations, shown: Sequence[LinearQuantity], pushes: Sequence[Channel]
 ) -> list[Array]:
-    """Of each output what it is of increments, their rates and accelerations, of the drives that
-    are pushes and of these at once."""
+    """Row of each output.
+
+    Each row has the factors of increments, rates and accelerations, of those of drives that are
+    inputs, and the feedthrough of the inputs.
+    """
     places = [*linear.free, *(speed for one in pushes for speed, _ in one.moves)]
     found, none = [], np.zeros((1, linear.model.nu))
     for one in shown:
@@ -77,8 +80,7 @@ def _differ(one: Array, other: Array) -> bool:
 
 
 def _matrices_differ(one: LinearEquations, other: LinearEquations) -> bool:
-    """Whether M, C or K differ, each entry seen beside its row and its column in a scene of unit
-    masses."""
+    """Whether M, C or K differ, scaled to unit masses and relative to rows and columns."""
     scale = np.sqrt(np.maximum(one.M.diagonal(), np.finfo(float).tiny))
     first, second = (
         [x / np.outer(scale, scale) for x in (at.M, at.C, at.K)] for at in (one, other)

@@ -1,4 +1,4 @@
-"""Whether an operating point lasts: what pushes its coordinates away, there and later."""
+"""Departure from an operating point: unbalanced efforts at the state and along its motion."""
 
 from __future__ import annotations
 
@@ -17,20 +17,28 @@ from .later import LaterStates
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Distance from rest, and acceleration per s^2 of what nothing holds, in sizes of coordinates;
-#: stiffness that counts as none, in parts.
+#: Negligible distance from equilibrium, and acceleration (per s^2) of unrestrained coordinates, in
+#: characteristic scales; relative stiffness that counts as zero.
 _STILL, _SOFT = 1e-6, 1e-13
-#: Small change of a state: effort in parts of the scene's weight, distance in sizes of coordinates.
+#: Small change of a state: effort relative to the weight of the scene, distance in characteristic
+#: scales.
 _SMALL_EFFORT, _SMALL_DISTANCE = 1e-3, 1e-2
-#: Coordinates up to which matrices are made.
+#: Largest number of coordinates for which matrices are computed.
 LARGEST = 2000
 
 
 @dataclass(frozen=True)
 class Departure:
-    """What leaves an operating point: names of `coordinates`, of which the effort (N or N*m) that
-    is missing along `worst` at time `t` (s) is the largest.  It `is_small` if springs or gravity
-    hold all of them near the state against a load far below the weight."""
+    """Departure of coordinates from an operating point.
+
+    Attributes:
+        coordinates: names of the departing coordinates.
+        worst: coordinate with the largest unbalanced effort.
+        effort, unit: that effort, N or N*m.
+        t: its time (s).
+        is_small: whether springs or gravity keep all of them near the state against a load far
+            below the weight.
+    """
 
     coordinates: list[str]
     worst: str
@@ -44,8 +52,10 @@ class Departure:
 
 
 def find_departure(linear: LinearEquations, later: LaterStates | None = None) -> Departure | None:
-    """What leaves the operating point there or, with `later`, further along its motion; None where
-    it lasts."""
+    """Departure from the operating point; None if it is steady.
+
+    With `later`, states further along its motion are also checked.
+    """
     states = [linear.state, *(() if later is None else later.every)]
     free = list(linear.free)
     a = np.array([one.a[free] for one in states]).T
@@ -55,7 +65,7 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     leaves, efforts, distances = _leaving(linear, a, sizes)
     if not leaves.any():
         return None
-    if leaves[:, 0].any():  # what is wrong at once comes first
+    if leaves[:, 0].any():  # an immediate departure takes precedence
         leaves[:, 1:] = False
     work = np.where(leaves, np.abs(efforts) * sizes[:, None], 0.0)
     worst, at = np.unravel_index(int(work.argmax()), work.shape)
@@ -75,11 +85,11 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
 def _leaving(
     linear: LinearEquations, a: Array, sizes: Array
 ) -> tuple[NDArray[np.bool_], Array, Array]:
-    """(n, k) which coordinates leave under accelerations a (n, k), the missing efforts, and the
-    distances from rest in sizes.
+    """Departing coordinates, unbalanced efforts and distances for accelerations a (n, k).
 
-    Coordinates leave whose rest is farther away than a small part of their sizes, and those that
-    accelerate without anything that holds them, for which the distance is infinite.
+    All results are (n, k).  Distances from equilibrium are in characteristic scales.  A coordinate
+    departs if its distance exceeds a small fraction of its scale, or if it accelerates without
+    restraint; then the distance is infinite.
     """
     if len(linear) > LARGEST:
         columns = [_displacement_by_sweep(linear, column) for column in a.T]
@@ -97,8 +107,10 @@ def _leaving(
 def _forced_distance(
     linear: LinearEquations, later: LaterStates, efforts: Array, sizes: Array
 ) -> float:
-    """Largest amplitude, in sizes, under these efforts (n, k) at the rate of the fastest drive;
-    infinite where no drive moves, and for matrices that are too large."""
+    """Largest amplitude under harmonic efforts (n, k) at the rate of the fastest drive.
+
+    It is in characteristic scales, and infinite without moving drives or for too large matrices.
+    """
     if not later.driven or len(linear) > LARGEST:
         return np.inf
     rate = np.abs(linear.state.u[later.driven]).max()
@@ -110,14 +122,14 @@ def _forced_distance(
 
 
 def _efforts(linear: LinearEquations, a: Array) -> Array:
-    """(n, k) M a, without matrices where there are none."""
+    """Product M a (n, k), for trees without matrices."""
     if linear.mechanism is not None:
         return linear.M @ a
     return np.array([linear.pencil.mass(column) for column in a.T]).T
 
 
 def _displacement_by_sweep(linear: LinearEquations, a: Array) -> Array:
-    """(n,) distance from rest, K^-1 M a, without matrices; infinite where K is singular."""
+    """Distance (n,) from equilibrium, K^-1 M a, without matrices; infinite if K is singular."""
     if linear.mechanism is not None or linear.turning is not None:
         return np.where(a == 0, 0.0, np.inf)
     pencil = linear.pencil

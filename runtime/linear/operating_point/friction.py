@@ -1,15 +1,15 @@
-"""Dry friction in linear models: left out where a hinge rests, or as equivalent viscous damping.
+"""Dry friction in linear models: omitted at rest, or equivalent viscous damping.
 
-Dry friction has no slope at rest.  The law of a hinge is smooth over its regularisation velocity
-alone, and its slope there is the friction over that velocity, which is no property of the scene.
-Where the hinge slides at the state, the slope of its law is that of the motion, and stays.
+Dry friction has no slope at rest.  The law of a hinge is smooth only within its regularisation
+velocity; its slope there, the friction over that velocity, is not a property of the scene.  Where
+the hinge slides at the state, the slope of its law is that of the motion and is kept.
 
-Under u = V sin(omega t) friction F(u) takes as much work from a period as a viscous damper of
+For u = V sin(omega t) the work of friction F(u) in a period equals that of a viscous damper of
 
     c = 2/(pi V) integral from 0 to pi of F(V sin x) sin x dx,
 
-its describing function (N. Minorsky, Introduction to Non-linear Mechanics, 1947).  Coulomb's
-friction has c = 4 F/(pi V); what Stribeck's law adds is Dawson's integral.
+its describing function (N. Minorsky, Introduction to Non-linear Mechanics, 1947).  For Coulomb
+friction c = 4 F/(pi V); the Stribeck term adds a Dawson integral.
 """
 
 from __future__ import annotations
@@ -32,18 +32,24 @@ from ...packing.system import LawNumbers, LawRun
 if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
 
-#: Amplitudes of speed (rad/s or m/s): one, or by the names of hinges, chains and speeds.
+#: Amplitudes of speed (rad/s or m/s): one, or by names of hinges, chains and speeds.
 Amplitudes = float | Mapping[str, float] | None
 
-#: Regularisation velocities above which a hinge slides: tanh is 1 but for 4e-9.
+#: Multiple of the regularisation velocity above which a hinge slides: tanh is within 4e-9 of 1.
 _SLIDING = 10.0
-#: Places of damping, friction and velocities among the numbers of a law with friction.
+#: Kernel of laws with friction, and indices of damping, friction and velocities in its parameters.
 _KERNEL, _DAMPING, _COULOMB, _STATIC, _STRIBECK, _WIDTH = "full", 2, 3, 4, 5, 6
 
 
 class Rubbing(NamedTuple):
-    """Friction of one speed that rests: Coulomb's and static (N or N*m), the damping that takes its
-    place (N*s/m or N*m*s/rad), and whether an amplitude was given for it."""
+    """Friction of one speed that does not slide.
+
+    Attributes:
+        speed: index of the speed.
+        coulomb, static: Coulomb and static friction (N or N*m).
+        damping: equivalent viscous damping (N*s/m or N*m*s/rad).
+        given: whether an amplitude was given.
+    """
 
     speed: int
     coulomb: float
@@ -54,8 +60,7 @@ class Rubbing(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class DryFriction:
-    """Friction of the hinges of a model that do not slide at speeds u (nu,), and what takes its
-    place."""
+    """Friction of the hinges of a model that do not slide, and its equivalent damping."""
 
     model: CompiledScene
     rubbing: Mapping[int, Rubbing]
@@ -65,7 +70,7 @@ class DryFriction:
         return bool(self.rubbing)
 
     def replaced(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
-        """Laws of the model's system with viscous damping in the place of this friction."""
+        """Laws of the system of the model with viscous damping instead of this friction."""
         first = self.model.packed.system.places["u"]
 
         def change(law: LawNumbers, body: int) -> LawNumbers:
@@ -80,15 +85,17 @@ class DryFriction:
         return tuple(law for run in laws for law in changed_laws(run, change))
 
     def engine(self, model: CompiledScene) -> LoopedEngine:
-        """The looped engine of this model, or of it with other numbers, with these laws."""
+        """Looped engine of the model, or of its variant with other parameters, with these laws."""
         packed = model.packed
         made = replace(packed.system, laws=self.replaced(packed.system.laws))
         return LoopedEngine(packed_system(made, packed))
 
 
 def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
-    """A run of laws, each changed by itself and the place of its body: a pattern where all its
-    repeats change alike, else one by one."""
+    """Yield a run of laws with `change` applied to each law and body index.
+
+    The run keeps its pattern if all its repeats change equally; else each law becomes a run.
+    """
     every = [(change(law, body), body, twist, places) for law, body, twist, places in run.each()]
     width = len(run.pattern)
     pattern = [law for law, _, _, _ in every[:width]]
@@ -102,7 +109,7 @@ def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -
 
 
 def dry_friction(model: CompiledScene, u: Array, amplitudes: Amplitudes) -> DryFriction:
-    """The friction that a linear model about a state with speeds u (nu,) replaces.
+    """Friction that a linear model about a state with speeds u (nu,) omits or replaces.
 
     Raises SceneError for names without friction and amplitudes that are not positive.
     """
@@ -136,7 +143,7 @@ def _rubbing(speed: int, p: tuple[float, ...], amplitude: float | None) -> Rubbi
 def _amplitudes(
     model: CompiledScene, given: Amplitudes, speeds: list[int]
 ) -> Callable[[int], float | None]:
-    """The amplitude of a speed; None where none is given for it."""
+    """Function that returns the amplitude of a speed, or None if none is given for it."""
     if given is None:
         return lambda speed: None
     if not isinstance(given, Mapping):
@@ -157,7 +164,7 @@ def _amplitudes(
 
 
 def _names(speed: str) -> tuple[str, str, str]:
-    """What the friction of a speed is called: the speed, its hinge, the chain of that."""
+    """Names accepted for the friction of a speed: the speed, its hinge, the chain of the hinge."""
     hinge = speed.rpartition(".")[0]
     return speed, hinge, hinge.partition("[")[0]
 

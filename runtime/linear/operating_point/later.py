@@ -22,29 +22,32 @@ from ..mck_matrices import State
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: How far the fastest and the slowest motion go on, rad or lengths of the scene: no two differ by
-#: a part of a turn with a small whole number.
+#: Advance of the fastest and of the slowest motion, rad or scene lengths: no two differ by a simple
+#: fraction of a revolution, at which a periodic change would be missed.
 _PHASES = (0.7, 1.9, 3.3)
-#: Speeds, in parts of the fastest, that are rounding.
+#: Speeds that are rounding, relative to the fastest.
 _STILL = 1e-9
-#: Times in s after which what depends on time is looked at, and how many of its breaks are.
+#: Times (s) after the state at which dependence on time is checked, and about how many breaks of
+#: inputs and expressions are used for further times.
 _TIMES, _BREAKS = 1.0437 * np.geomspace(1e-3, 1e3, 19), 16
-#: The last time after which a motion is looked at.
+#: Latest time (s) after the state at which a motion is checked.
 _LATEST = float(_TIMES[-1])
-#: Every how many of these times the matrices are compared.
+#: Stride of the times at which matrices are compared.
 _SPARSE = 3
-#: Motion in rad or sizes over which closed loops are settled anew, and how often.
+#: Motion (rad or characteristic scales) between projections of closed loops, and the largest number
+#: of projections.
 _STRIDE, _MOST_STRIDES = 0.1, 100
 
 
 class LaterStates:
-    """States further along the motion that keeps the speeds of an operating point, with drives and
-    loads as they are then.
+    """States further along the motion with the speeds of an operating point.
+
+    Drives and loads are those of the later times.
 
     Attributes:
-        every: all of them; none where nothing moves and nothing depends on time.
-        sparse: those at which matrices are compared.
-        driven: places of the speeds of drives that move at the operating point.
+        every: all states; empty if nothing moves and nothing depends on time.
+        sparse: states at which matrices are compared.
+        driven: speed indices of the drives that move at the operating point.
     """
 
     def __init__(self, linear: LinearEquations) -> None:
@@ -64,13 +67,13 @@ class LaterStates:
         self.sparse = [*turning, *(timed[::_SPARSE] if depends else ())]
 
     def equations(self) -> Iterator[LinearEquations]:
-        """The linear equations at those states at which they are compared."""
+        """Yield the linear equations at the states `sparse`."""
         for state in self.sparse:
             yield equations_at(self._linear, state)
 
     @property
     def cause(self) -> str:
-        """What goes on, for messages."""
+        """Cause of later changes, for messages."""
         model = self._linear.model
         hinges = dict.fromkeys(model.layout.hinge_of_speed(k).name for k in self.driven)
         if hinges:
@@ -80,7 +83,7 @@ class LaterStates:
         return "as loads or drives change with time"
 
     def _phases(self) -> list[float]:
-        """Times (s) after which what moves has gone on by `_PHASES`, or as far as it comes."""
+        """Times (s) after which motions have advanced by `_PHASES`, at most `_LATEST`."""
         linear = self._linear
         rates = np.abs(linear.state.u) / speed_scales(linear.model)
         rates = rates[rates > _STILL * rates.max(initial=0)]
@@ -89,7 +92,7 @@ class LaterStates:
         return list(dict.fromkeys(min(time, _LATEST) for time in times))
 
     def _breaks(self) -> list[float]:
-        """Times (s) from the state on, between those at which expressions and inputs switch."""
+        """Times (s) after the state, midway between breaks of expressions and inputs."""
         scene, t = self._linear.model.scene, self._linear.state.t
         inputs, found = scene.channels, set[float]()
         for one in active_expressions(scene):
@@ -101,7 +104,7 @@ class LaterStates:
         return [(a + b) / 2 for a, b in pairwise(ends)]
 
     def _at(self, times: list[float]) -> Iterator[State]:
-        """States so long (s) after the operating point, of those that can be evaluated."""
+        """Yield the states at `times` (s) after the operating point that can be evaluated."""
         for dt in times:
             try:
                 state = _state_after(self._linear, dt)
@@ -112,7 +115,7 @@ class LaterStates:
 
 
 def equations_at(linear: LinearEquations, state: State) -> LinearEquations:
-    """The same equations at another state of the same motion."""
+    """Linear equations at another state of the same motion."""
     loops = linear.mechanism
     loops = None if loops is None else loops.at(state)
     turning, carrying = linear.turning if loops is None else loops.turning, linear.carrying
@@ -124,7 +127,7 @@ def equations_at(linear: LinearEquations, state: State) -> LinearEquations:
 
 
 def _state_after(linear: LinearEquations, dt: float) -> State | None:
-    """The state after dt (s); None where closed loops would have to be followed too far."""
+    """State after dt (s); None if closed loops would need too many projections."""
     state, count = linear.state, 1
     if linear.mechanism is not None:
         rate = float((np.abs(state.u) / speed_scales(linear.model)).max(initial=0))
@@ -141,7 +144,7 @@ def _state_after(linear: LinearEquations, dt: float) -> State | None:
 
 
 def _moved(linear: LinearEquations, t: float, q: Array, u: Array, dt: float) -> tuple[Array, Array]:
-    """State at t after a step of dt with drives and loops in order, the speeds of x as they are."""
+    """State at t after a step dt that satisfies drives and loops and keeps the speeds of x."""
     model, loops = linear.model, linear.mechanism
     engine = model.looped
     rates = engine.rates(t, q, u, engine.start_memory())

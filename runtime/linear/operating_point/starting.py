@@ -1,4 +1,4 @@
-"""Speeds that a scene starts with and keeps, which a linear model at rest does not have."""
+"""Initial speeds of a scene that persist and that a linear model at rest omits."""
 
 from __future__ import annotations
 
@@ -19,16 +19,19 @@ from ...run.start_state import initial_state
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: What pushes a motion back or slows it down is weak below these parts of (its speed)^2 and of its
-#: speed, in sizes a second.
+#: Stiffness and damping per mass are weak below these fractions of the squared speed and of the
+#: speed, in characteristic scales per second.
 _WEAK, _SLOW = 0.01, 0.1
-#: Changes of the matrices that count, in parts of the speed; and those that are rounding.
+#: Significant changes of the matrices, relative to the speed, and relative rounding.
 _CHANGED, _ROUNDING = 1e-3, 1e-9
 
 
 def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
-    """One risk where the scene starts with speeds that last and change the model, which is at rest
-    because no state was given; of more than `most` coordinates any speed counts."""
+    """Risk of initial speeds that persist and change a model that is at rest.
+
+    It applies if the model is at rest because no state was given.  With more than `most`
+    coordinates any initial speed counts.
+    """
     if linear.at_speeds is None or not len(linear):
         return
     speeds = initial_state(linear.model)[1][list(linear.free)]
@@ -51,12 +54,12 @@ def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
 
 
 def _fastest(linear: LinearEquations, speeds: Array) -> float:
-    """The largest of the speeds (n,), in sizes a second."""
+    """Largest of the speeds (n,), in characteristic scales per second."""
     return float(np.abs(speeds / speed_scales(linear.model)[list(linear.free)]).max())
 
 
 def _lasting(linear: LinearEquations, speeds: Array) -> Array:
-    """The part of the speeds (n,) that nothing pushes back or slows down within a turn."""
+    """Part of the speeds (n,) that no stiffness or damping changes within a revolution."""
     scale = np.sqrt(linear.M.diagonal())
     fastest, stiffness = _fastest(linear, speeds), linear.K / np.outer(scale, scale)
     _, squares, ways = np.linalg.svd(stiffness)
@@ -67,7 +70,7 @@ def _lasting(linear: LinearEquations, speeds: Array) -> Array:
 
 
 def _matter(linear: LinearEquations, speeds: Array) -> bool:
-    """Whether the matrices beside these speeds (n,) are others than at rest."""
+    """Whether the matrices at these speeds (n,) differ from those at rest."""
     assert linear.at_speeds is not None
     try:
         beside = linear.at_speeds(linear.state.u + linear.spread(speeds))

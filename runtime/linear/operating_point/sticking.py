@@ -1,4 +1,4 @@
-"""Dry friction that a linear model leaves out: sticking of hinges, and friction by expressions."""
+"""Risks of dry friction omitted by a linear model: sticking hinges, friction by expressions."""
 
 from __future__ import annotations
 
@@ -19,26 +19,28 @@ from .friction import Rubbing
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Part of a radian or a length of the scene below which sticking is no doubt.
+#: Fraction of a radian or a scene length below which sticking is no objection.
 _SMALL = 0.01
-#: Radians or lengths of the scene beyond which nothing pushes a hinge back.
+#: Radians or scene lengths beyond which a hinge counts as unrestrained.
 _FAR = 10.0
-#: Speeds in sizes a second, damping in 1/s that is none, and the part of the damping at
-#: the small speed below which that at the other one is another.
+#: Low and high speed in characteristic scales per second, negligible damping in 1/s, and ratio of
+#: the damping at high speed to that at low speed below which it is saturated.
 _SLOW, _FAST, _FAINT, _SATURATED = 1e-3, 0.1, 1e-6, 0.1
-#: A speed at which smooth efforts differ by rounding, and how far above that others are some.
+#: Speed at which smooth efforts differ only by rounding, and multiple of this rounding above which
+#: damping is significant.
 _NOISE, _ABOVE = 1e-13, 30.0
-#: Coordinates up to which each is moved by itself; beyond, how many neighbours move the same way.
+#: Number of coordinates up to which each is moved individually; above it, numbers of neighbours
+#: that move with the same sign.
 _SINGLE, _RUNS = 50, (1, 2, 1 << 30)
-#: Speeds, in sizes a second, at which an effort that jumps is the same; the part of a jump by which
-#: it may differ, and acceleration in sizes/s^2 that is none.
+#: Speeds, in characteristic scales per second, between which a jump of an effort does not change;
+#: the fraction by which it may differ; negligible acceleration in scales/s^2.
 _NEAR, _STEADY, _CREEP = (1e-6, 1e-8), 0.5, 1e-6
-#: Entries that a message lists; stiffness that is none, in parts.
+#: Number of entries in a message; relative stiffness that counts as zero.
 _LISTED, _SOFT = 4, 1e-12
 
 
 def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
-    """One risk for all hinges whose friction is left out: the amplitude below which they stick."""
+    """Risk for all hinges whose friction is omitted: the amplitude below which they stick."""
     left = [one for one in linear.dry.rubbing.values() if not one.given] if linear.dry else []
     if not left:
         return
@@ -65,8 +67,14 @@ def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
 
 @dataclass(frozen=True)
 class Ways:
-    """Independent motions beside a state: names, units of increments, characteristic scales (n,),
-    `along` from (n,) to all speeds (nu,), and `onto` from efforts (nu,) to those along them."""
+    """Independent motions about a state.
+
+    Attributes:
+        names, units: names and units of increments.
+        sizes: (n,) characteristic scales.
+        along: map from increments (n,) to all speeds (nu,).
+        onto: map from efforts (nu,) to efforts along the motions (n,).
+    """
 
     names: Sequence[str]
     units: Sequence[str]
@@ -76,7 +84,7 @@ class Ways:
 
 
 def ways_of(linear: LinearEquations) -> Ways:
-    """Those of x, of a rotor in axes that turn along with it."""
+    """Independent motions of x; for a rotor in axes that rotate with it."""
     plain, free, loops = replace(linear, carrying=None), list(linear.free), linear.mechanism
     return Ways(
         linear.coordinates, linear.units, speed_scales(linear.model)[free], plain.spread,
@@ -85,8 +93,11 @@ def ways_of(linear: LinearEquations) -> Ways:
 
 
 def saturation_risks(linear: LinearEquations, ways: Ways) -> Iterator[Risk]:
-    """Coordinates with friction that an expression describes: an effort that jumps with speeds at
-    the state, -10*sign(u), or damping that is that of small speeds alone, -10*tanh(u/0.001)."""
+    """Risks of coordinates with friction by an expression.
+
+    These have an effort that jumps with speed at the state, such as -10*sign(u), or damping that
+    saturates above low speeds, such as -10*tanh(u/0.001).
+    """
     n = len(ways.sizes)
     if not n:
         return
@@ -111,9 +122,12 @@ def saturation_risks(linear: LinearEquations, ways: Ways) -> Iterator[Risk]:
 
 
 def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float], Array]:
-    """The function of a speed, in sizes a second, that gives (k, n) how much larger efforts along
-    the coordinates are at this speed with `signs` (k, n) than at the opposite one; at 0, at an
-    acceleration of one size/s^2.  Of single coordinates (n, n) each has its own alone, (1, n)."""
+    """Function of a speed that returns differences (k, n) of efforts along the coordinates.
+
+    The differences are between this speed, in characteristic scales per second with `signs` (k, n),
+    and its opposite; at 0, between an acceleration of one scale/s^2 and none.  If coordinates are
+    moved individually, the result (1, n) has only the effort of each along itself.
+    """
     tree, state, memory = linear.tree, linear.state, linear.tree.start_memory()
 
     def efforts(u: Array, a: Array) -> Array:
@@ -134,7 +148,7 @@ def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float]
 
 
 def _jump_risk(name: str, unit: str, jump: float, least: float) -> Risk:
-    """An effort that jumps with speeds."""
+    """Risk of an effort that jumps with speed."""
     unit = "N*m" if unit == "rad" else "N"
     return Risk(
         "dry-friction", name,
@@ -145,7 +159,7 @@ def _jump_risk(name: str, unit: str, jump: float, least: float) -> Risk:
 
 
 def _saturated_risk(name: str, ways: Ways, k: int, part: float) -> Risk:
-    """Damping that is a part of that at small speeds."""
+    """Risk of damping that saturates above low speeds."""
     return Risk(
         "dry-friction", name,
         f"damping of {name} is that of speeds near the state alone: at "
@@ -156,7 +170,7 @@ def _saturated_risk(name: str, ways: Ways, k: int, part: float) -> Risk:
 
 
 def _sentence(name: str, unit: str, amplitude: float, static: float) -> str:
-    """Of one speed: below what it sticks."""
+    """Text on the amplitude and effort below which a hinge sticks."""
     effort = f"{static:.4g} {'N*m' if unit == 'rad' else 'N'}"
     hinge = name.rpartition(".")[0]
     if not math.isfinite(amplitude):
@@ -170,8 +184,10 @@ def _unit(linear: LinearEquations, speed: int) -> str:
 
 
 def _stuck_below(linear: LinearEquations, left: list[Rubbing]) -> Array:
-    """(k,) how far static friction holds each of some speeds against the stiffness there is, all
-    other coordinates following; infinite where there is none."""
+    """Amplitude (k,) below which static friction holds each speed against the stiffness.
+
+    All other coordinates follow.  It is infinite without stiffness.
+    """
     ways = np.zeros((len(left), len(linear)))
     if not linear.has_stiffness:
         return np.full(len(left), np.inf)
