@@ -1,1 +1,1 @@
-"""Harmonic motion: damping that is asked for, and beams by their dynamic stiffness."""
+"""Harmonic response: hysteretic and modal damping, beams with dynamic stiffness."""

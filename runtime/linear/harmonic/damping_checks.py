@@ -1,4 +1,4 @@
-"""Damping that does not go with a state, or with exact beams."""
+"""Checks for damping incompatible with an operating point or with exact beams."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def is_requested(damping: Losses | Ratios) -> bool:
-    """Whether there is any."""
+    """Whether any damping is requested."""
     return not (isinstance(damping, int | float) and damping == 0)
 
 
 def refuse_in_motion(linear: LinearEquations, structural: Losses, modal: Ratios) -> None:
-    """SceneError for damping of a state that moves."""
+    """Raise SceneError for structural or modal damping about a moving state."""
     if linear.state.u.any() and (is_requested(structural) or is_requested(modal)):
         raise SceneError(
             "frequency response: structural and modal damping are those of a scene at rest, and "
@@ -30,7 +30,7 @@ def refuse_in_motion(linear: LinearEquations, structural: Losses, modal: Ratios)
 
 
 def refuse_ratios(modal: Ratios) -> None:
-    """SceneError for modal ratios beside exact beams."""
+    """Raise SceneError for modal damping ratios together with exact beams."""
     if is_requested(modal):
         raise SceneError(
             "modal: ratios are those of natural motions by shapes, which exact beams do not have; "
@@ -39,7 +39,7 @@ def refuse_ratios(modal: Ratios) -> None:
 
 
 def refuse_drives(pushes: Sequence[Channel], changed: bool) -> None:
-    """SceneError for motions of drives where stiffness or inertia is not that of the matrices."""
+    """Raise SceneError for drive motions if stiffness or inertia is `changed` from M, C, K."""
     moved = next((one.name for one in pushes if one.moves), "")
     if changed and moved:
         raise SceneError(

@@ -1,11 +1,12 @@
-"""Natural motions of scenes with exact beams, by count: no zero is searched, none is missed.
+"""Normal modes of scenes with exact beams by the Wittrick-Williams algorithm: none is missed.
 
-Below omega lie, of undamped motions (Wittrick and Williams, Q. J. Mech. Appl. Math. 24 (1971)
-263-284),
+The number of undamped modes below omega is (Wittrick and Williams, Q. J. Mech. Appl. Math. 24
+(1971) 263-284)
 
-    J(omega) = sum over exact beams of those with both ends held + negative pivots of the sweep,
+    J(omega) = sum over exact beams of their clamped-clamped modes + negative pivots of the sweep.
 
-and J rises by one at each, by as many as coincide.  Bisection of all of them at once finds where.
+J rises at each natural frequency by its multiplicity.  Simultaneous bisection on J finds all
+frequencies without a root search.
 """
 
 from __future__ import annotations
@@ -28,30 +29,30 @@ from .exact_beams import Chosen, ExactBeams, exact_beams
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Bounds of a frequency in parts of it, and where a pivot vanishes, how far beside it is counted:
-#: next to a pole of a long beam, whose ends hardly know of each other, further than elsewhere.
+#: Relative width of the final bracket; relative shifts of omega tried where a pivot vanishes. Near
+#: poles of a long beam, whose ends are almost decoupled, larger shifts are needed.
 _CLOSE, _BESIDE = 2.0**-51, tuple(2.0**-k for k in range(46, 26, -4))
-#: Frequencies in parts of that of a beam alone: below the first they count as 0, above the second
-#: nothing is looked for.
+#: Frequencies relative to the lowest one of a single beam: below the first they count as 0; the
+#: search ends at the second.
 _SLOWEST, _FASTEST = 1e-6, 1e12
-#: How near to a frequency its shapes are asked for.
+#: Relative distance from a natural frequency at which its shapes are computed.
 _NEAR = 1e-9
-#: Numbers of one batch of frequencies.
+#: Size limit of one batch of frequencies, in matrix entries.
 _BATCH = 2**20
-#: A stiffness further from symmetric than this, in parts, is not that of a potential.
+#: Relative asymmetry above which a stiffness does not derive from a potential.
 _SYMMETRIC = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class DynamicStiffnessModes(AssessedAnswer):
-    """The slowest k undamped natural motions, those with exact beams, by rising omega.
+    """The k slowest undamped normal modes of a scene with exact beams, by rising omega.
 
     Attributes:
-        omega: (k,) rad/s.
-        coordinates: n names; of an exact beam deflection and slope times length of its far end
-            beside the tangent at the other.
-        shapes: (n, k), the largest entry of each 1.
-        complete: True: none below the last is missing.
+        omega: (k,) angular natural frequencies, rad/s.
+        coordinates: n names; for an exact beam, the deflection and the slope times length of its
+            far end relative to the tangent at the near end.
+        shapes: (n, k) mode shapes, the largest entry of each 1.
+        complete: always True: no mode below the last one is missing.
         findings: risks of the linear model.
     """
 
@@ -66,11 +67,11 @@ class DynamicStiffnessModes(AssessedAnswer):
 
     @property
     def frequency(self) -> Array:
-        """(k,) Hz."""
+        """Natural frequencies (k,), Hz."""
         return self.omega / (2 * np.pi)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything, for JSON."""
+        """All results as a dictionary for JSON."""
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "coordinates": list(self.coordinates), "shapes": self.shapes.tolist(),
@@ -79,7 +80,7 @@ class DynamicStiffnessModes(AssessedAnswer):
 
 
 def exact_modes(linear: LinearEquations, count: int, chosen: Chosen) -> DynamicStiffnessModes:
-    """See `Linear.exact_modes`."""
+    """Normal modes with exact beams; see `Linear.exact_modes`."""
     count = integer("count", count, 1, "a number of motions, 1 or more")
     beams = exact_beams(linear, chosen, 0.0).undamped()
     counter = _Counter(beams)
@@ -92,7 +93,7 @@ def exact_modes(linear: LinearEquations, count: int, chosen: Chosen) -> DynamicS
 
 
 class _Counter:
-    """J of one model, and shapes."""
+    """Mode count J of one model, and its mode shapes."""
 
     def __init__(self, beams: ExactBeams) -> None:
         linear = beams.linear
@@ -117,7 +118,7 @@ class _Counter:
         self.most = max(4, _BATCH // max(1, size))
 
     def below(self, omega: Array) -> Integers:
-        """J (k,) at omega (k,)."""
+        """Mode count J (k,) below omega (k,), rad/s."""
         parts = [omega[k : k + self.most] for k in range(0, len(omega), self.most)]
         return np.concatenate([self._counted(part) for part in parts])
 
@@ -130,7 +131,7 @@ class _Counter:
         raise NumericalFailure(f"exact modes: near {omega[found < 0][0]:.9g} rad/s pivots vanish")
 
     def bisected(self, count: int) -> Array:
-        """omega (count,) of the slowest."""
+        """Natural frequencies omega (count,) of the slowest modes, rad/s."""
         low = _SLOWEST * self.unit
         if (self.response.count_negative(np.array([low**2])) > 0).any():
             raise SceneError(
@@ -157,7 +158,7 @@ class _Counter:
         return np.where(wanted <= still, 0.0, (lower + upper) / 2)
 
     def shapes(self, omega: Array) -> Array:
-        """(n, k): answers next to each frequency; of equal ones as many as there are."""
+        """Mode shapes (n, k): responses next to each frequency, one for each multiplicity."""
         runs = _runs(omega)
         near = np.maximum(omega[[first for first, _ in runs]], _SLOWEST * self.unit) * (1 - _NEAR)
         most = max(last - first for first, last in runs)
@@ -172,7 +173,7 @@ class _Counter:
 
 
 def _runs(omega: Array) -> list[tuple[int, int]]:
-    """From and to of frequencies that are one."""
+    """Index ranges (first, end) of coinciding frequencies."""
     apart = np.diff(omega) > 10 * _NEAR * omega[1:]
     cuts = [0, *(np.flatnonzero(apart) + 1).tolist(), len(omega)]
     return list(itertools.pairwise(cuts))

@@ -1,10 +1,10 @@
-"""Beams by their dynamic stiffness in place of shapes: the scene that is swept, and theirs.
+"""Beams with exact dynamic stiffness instead of shape functions.
 
-Such a beam keeps two shapes in each bending plane and one of twist and tension, the displacements
-of its far end, by which it joins what hangs there.  For every s the dynamic stiffness of frame and
-shapes takes the place of mass and stiffness of the body, and the sweep goes on as ever.  The
-solution is that of a straight uniform beam of Euler and Bernoulli that nothing bends or pulls at
-rest; whatever else a beam has is refused by name.
+An exact beam keeps two shape functions in each bending plane and one each for twist and tension:
+the displacements of its far end, which couple it to the outboard bodies.  At each s the dynamic
+stiffness of frame and shapes replaces mass and stiffness of the body; the sweep is unchanged.  The
+solution is that of a straight uniform Euler-Bernoulli beam, neither bent nor under tension at rest;
+any other property of a beam is rejected by name.
 """
 
 from __future__ import annotations
@@ -40,17 +40,17 @@ if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
     from ..linear_equations import LinearEquations
 
-#: Which beams are exact: all of the scene, none, or those of these names.
+#: Which beams are exact: all beams of the scene, none, or the named ones.
 Chosen = bool | Sequence[str]
 
-#: Deflections at rest in parts of the length, and stiffness by tension in parts of the elastic one,
-#: that count as none.
+#: Negligible deflection at rest, relative to the length; negligible stiffness due to tension,
+#: relative to the elastic stiffness.
 _STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True)
 class ExactBeams:
-    """A linear model whose beams of these names, in the order of `beams`, are exact."""
+    """Linear model with exact beams: `names` in the order of `beams`."""
 
     linear: LinearEquations
     names: tuple[str, ...]
@@ -58,14 +58,14 @@ class ExactBeams:
 
     @property
     def bodies(self) -> DynamicStiffnessBodies:
-        """What the sweep takes for them."""
+        """Bodies of the exact beams, with their dynamic stiffness, for the sweep."""
         positions = self.linear.model.packed.positions
         return DynamicStiffnessBodies(
             tuple(positions[name] for name in self.names), self._stiffness
         )
 
     def _each(self, of: Callable[[HarmonicBeam], Any]) -> list[Any]:
-        """A number of every beam, of equal ones asked once."""
+        """Value of `of` for each beam, computed once for equal beams."""
         distinct = {id(beam): beam for beam in self.beams}
         found = {key: of(beam) for key, beam in distinct.items()}
         return [found[id(beam)] for beam in self.beams]
@@ -74,28 +74,28 @@ class ExactBeams:
         return self._each(lambda beam: beam.stiffness(s))
 
     def clamped(self, omega: Array) -> Integers:
-        """(k,) natural motions of all of them below omega, every beam held at both ends."""
+        """Number (k,) of clamped-clamped modes of all exact beams below omega (k,), rad/s."""
         return np.asarray(sum(self._each(lambda beam: beam.clamped(omega))), dtype=np.int64)
 
     @property
     def slowest(self) -> float:
-        """The least of their own frequencies, rad/s."""
+        """Lowest characteristic frequency of the exact beams, rad/s."""
         return min(beam.frequency for beam in self.beams)
 
     def undamped(self) -> ExactBeams:
-        """The same without any damping of theirs."""
+        """The same model with undamped exact beams."""
         return replace(self, beams=tuple(self._each(HarmonicBeam.undamped)))
 
     def named(self, coordinate: str) -> bool:
-        """Whether a coordinate is a shape of one of them."""
+        """Whether a coordinate belongs to an exact beam."""
         return coordinate.partition(".")[0] in self.names
 
 
 def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> ExactBeams:
-    """The model with beams that are exact.
+    """Linear model with the `chosen` beams exact.
 
-    Raises SceneError for names of no flexible beams and for beams and states that the solution does
-    not hold for.
+    Raises SceneError for names that are no flexible beams, and for beams and states outside the
+    validity of the solution.
     """
     if linear.mechanism is not None:
         raise SceneError("exact: a loop is closed; the solution goes along trees alone")
@@ -141,7 +141,7 @@ def _names(model: CompiledScene, chosen: Chosen) -> tuple[str, ...]:
 
 
 def _refuse(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
-    """SceneError for what the solution does not have."""
+    """Raise SceneError for beam properties that the solution does not cover."""
     inner = [x for x in places if x not in (0.0, data.length)]
     problem = ""
     if not data.uniform:
@@ -160,7 +160,7 @@ def _refuse(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
 
 
 def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> LinearEquations:
-    """The same model, the shapes of these beams the displacements of their far ends."""
+    """The same model with the displacements of the beams' far ends as shape functions."""
     model = linear.model
     data = scene_data(model.scene)
     for beam in data["beam"]:
@@ -198,7 +198,7 @@ def _reshape(beam: dict[str, Any], modes: Sequence[str]) -> None:
 def _distinct(
     linear: LinearEquations, tables: dict[str, Beam], names: Sequence[str], losses: Sequence[float]
 ) -> tuple[HarmonicBeam, ...]:
-    """The beams, equal ones being one."""
+    """Harmonic beams; equal beams share one object."""
     packed, known = linear.model.packed, dict[tuple[object, ...], HarmonicBeam]()
     found = []
     for name, loss in zip(names, losses, strict=True):
@@ -218,7 +218,7 @@ def _distinct(
 def _refuse_bent(
     linear: LinearEquations, given: LinearEquations, tables: dict[str, Beam], names: Sequence[str]
 ) -> None:
-    """SceneError for beams that something bends or pulls at rest."""
+    """Raise SceneError for beams that are bent or under axial load at rest."""
     model, state = linear.model, linear.state
     still = np.zeros(model.nu)
     memory = model.looped.start_memory()
@@ -246,7 +246,7 @@ def _refuse_bent(
 
 
 def _stiffness(linear: LinearEquations, x: Array) -> Array:
-    """K x of what stands: shapes and loads that are there, without laws and springs."""
+    """Product K x for flexible bodies and loads frozen at the state, without laws and springs."""
     state = linear.state
     tangent = TangentMatrix(standing(linear.model.looped, state))
     moved = tangent.rates(state.q, x)
@@ -256,7 +256,7 @@ def _stiffness(linear: LinearEquations, x: Array) -> Array:
 
 
 def refuse_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
-    """SceneError for pushes along exact beams: their stiffness is that between loads at ends."""
+    """Raise SceneError for distributed inputs on exact beams, which accept loads at ends only."""
     scene = beams.linear.model.scene
     loaded = any(
         load.force_per_length is not None and split_reference(load.on)[0] in beams.names
@@ -271,8 +271,10 @@ def refuse_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
 
 
 def refuse_inner(beams: ExactBeams, names: Sequence[str]) -> None:
-    """SceneError for what exact beams do not have, among names of inputs and outputs: shapes, and
-    ends between root and tip."""
+    """Raise SceneError for inputs and outputs that exact beams do not provide.
+
+    These are modal coordinates, and ends between root and tip.
+    """
     tables = {beam.name: beam for beam in beams.linear.model.scene.beam}
     for signal in names:
         name, rest = split_reference(signal)

@@ -1,4 +1,4 @@
-"""Amplitudes under harmonic pushes from matrices: of mechanisms, and of states that turn balls."""
+"""Harmonic amplitudes from M, C, K: closed loops and operating points with rotating balls."""
 
 from __future__ import annotations
 
@@ -15,16 +15,21 @@ Complex = NDArray[np.complex128]
 
 
 class Amplitudes:
-    """Z(s) x = r, as `Response` solves it of a tree at rest: x and r stand in `places` among the
-    speeds."""
+    """Solver of Z(s) x = r with the dynamic stiffness Z, for dense matrices.
+
+    Replaces `HarmonicResponse`, which covers trees at rest; x and r are at the indices `places`
+    among the speeds.
+    """
 
     def __init__(self, places: Sequence[int], whole: Matrices, lossy: Matrices | None) -> None:
         self._places, self._whole = list(places), whole
         self._lost = 0.0 if lossy is None else 1j * (lossy.K - whole.K)
 
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
-        """x (k, n, nu) at every s (k,) of n right-hand sides (n, nu), the condition (k,) of Z, and
-        no body."""
+        """Amplitudes x (k, n, nu) at s (k,) for n right-hand sides (n, nu).
+
+        Also returns the condition number (k,) of Z and the body index -1 (k,): no body.
+        """
         x = np.zeros((len(s), *columns.shape), dtype=np.complex128)
         growth, whole = np.zeros(len(s)), self._whole
         for k, at in enumerate(s):
@@ -37,8 +42,7 @@ class Amplitudes:
 
 
 def _condition(z: Complex, cancelling: Array) -> float:
-    """Of a symmetric matrix beside the sizes of what cancels in it, infinite where it is
-    singular."""
+    """Condition number of z relative to the sizes of its cancelling terms; inf if singular."""
     scale = np.sqrt(cancelling.max(axis=1, initial=0.0))
     if not len(z) or not scale.all():
         return float(np.inf) if len(z) else 1.0

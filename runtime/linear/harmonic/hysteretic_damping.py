@@ -1,8 +1,9 @@
-"""Hysteretic damping: what is elastic loses, at every frequency, the same part of its energy.
+"""Hysteretic damping: complex stiffness with frequency-independent loss factors.
 
-A loss factor eta makes the stiffness k of an element k (1 + i eta) under harmonic motion (Crandall,
-J. Sound Vib. 11 (1970) 3-18).  What the losses add is i (K' - K) of two scenes, whose elements lose
-nothing: the scene itself, and one that is stiffer by eta k and carries the same static loads.
+In harmonic motion a loss factor eta turns the stiffness k of an element into k (1 + i eta)
+(Crandall, J. Sound Vib. 11 (1970) 3-18).  The added term i (K' - K) follows from two lossless
+scenes: the scene itself, with K, and one with stiffness k (1 + eta) under the same static loads,
+with K'.
 """
 
 from __future__ import annotations
@@ -28,23 +29,23 @@ if TYPE_CHECKING:
     from ...engine.compiled_scene import CompiledScene
     from ..linear_equations import LinearEquations
 
-#: Loss factors of all that is elastic, or by the names of hinges, chains, flexible bodies, springs.
+#: One loss factor for all elastic elements, or by name of hinge, chain, flexible body or spring.
 Losses = float | Mapping[str, float]
 
-#: Rows of the matrices of bushings and bearings.
+#: Number of rows of the matrices of bushings and bearings.
 _SIZES = {"bushing6": 6, "bearing6": 6, "bearing3": 3}
-#: Places of stiffnesses among the numbers of a law; a rotation's are the three behind shifts.
+#: Indices of stiffnesses among the parameters of a law; those of a rotation follow the shifts.
 _STIFF = {
     "linear": (0,), "full": (0, 9), "rotation": (0, 1, 2), "six": (0, 1, 2, 9, 10, 11),
 }  # fmt: skip
 
 
 def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
-    """The scene with stiffness larger by what it loses, its elements as they stand at the state.
+    """Engine with each stiffness k raised to k (1 + eta), at unchanged loads of the state.
 
-    Efforts that expressions give, and elements of a user's own type, lose nothing.
+    Efforts given by expressions and user-defined elements are lossless.
 
-    Raises SceneError for a name that has no stiffness and for a loss factor that is below 0.
+    Raises SceneError for a name without stiffness and for a negative loss factor.
     """
     model, engine, state = linear.model, linear.tree, linear.state
     system, lossy = engine.packed.system, by_name(model, losses)
@@ -63,7 +64,7 @@ def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
 
 
 def by_name(model: CompiledScene, losses: Losses) -> Callable[[str], float]:
-    """The loss factor of an element by its name; members of a chain are their chain's."""
+    """Function from element name to loss factor; chain members have that of their chain."""
     if not isinstance(losses, Mapping):
         factor = _factor("structural", losses)
         return lambda name: factor
@@ -86,7 +87,7 @@ def _factor(what: str, value: float) -> float:
 
 
 def _elastic(model: CompiledScene) -> Iterator[str]:
-    """Names that may lose energy."""
+    """Names of elements that may have a loss factor."""
     packed = model.packed
     yield from model.layout.modal
     yield from (one.name for one in packed.scene.forces)
@@ -130,7 +131,7 @@ def _stiffer_force(
 def _stiffer_bushing(
     engine: LoopedEngine, force: ForceNumbers, state: State, factor: float
 ) -> ForceNumbers:
-    """A stiffer bushing whose load at the state is the same, by more preload."""
+    """Bushing with raised stiffness; added preload keeps its load at the state."""
     n = _SIZES[force.element[1]]
     pairs, above = n * (n + 1) // 2, n * (n - 1) // 2
     ends = np.cumsum([pairs, pairs, n, above])
@@ -151,7 +152,7 @@ def _stiffer_bushing(
 def _stiffer_spring(
     engine: LoopedEngine, force: ForceNumbers, state: State, factor: float
 ) -> ForceNumbers:
-    """A stiffer spring whose tension at the state is the same."""
+    """Spring with raised stiffness; a changed free length keeps its tension at the state."""
     if force.element != ("force", "spring") or not factor * force.p[0]:
         return force
     stiffness, rest, damping = force.p

@@ -1,11 +1,11 @@
-"""Modal damping: ratios that are prescribed for the natural motions of a whole scene.
+"""Modal damping: prescribed damping ratios of the normal modes of a scene.
 
-Of motions with unit modal mass, their shapes the columns of Phi, U = M Phi, a damping matrix
+For modes of unit modal mass, with shapes Phi and U = M Phi, the damping matrix
 
     C = U diag(2 zeta omega) U^T
 
-damps each by its zeta and leaves all others alone.  It is added to what the scene has by one small
-equation for each s (Woodbury), so that the sweep stays a sweep and no matrix of the scene is made:
+damps each mode by its zeta and no other mode.  The Woodbury identity adds it to the damping of the
+scene through one small equation for each s, so that the sweep needs no dense matrix:
 
     (Z + s U R U^T)^-1 r = x - Y c,    x = Z^-1 r,  Y = Z^-1 U,  (1 + s R U^T Y) c = s R U^T x
 """
@@ -28,20 +28,23 @@ from ..modes import Complex
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Ratios of the critical damping: one for all natural motions, or those of the slowest ones.
+#: Damping ratios: one for all normal modes, or one for each of the slowest.
 Ratios = float | Sequence[float]
 
 
 @dataclass(frozen=True)
 class ModalDamping:
-    """What k motions are damped by: `columns` U (n, k) and `rates` 2 zeta omega (k,) in 1/s."""
+    """Damping of k modes: `columns` U (n, k) and `rates` 2 zeta omega (k,), 1/s."""
 
     columns: Array
     rates: Array
 
     def damp(self, s: Complex, x: Complex, answers: Complex) -> Complex:
-        """Amplitudes (m, r, n) at s (m,) with the damping, from those without it: x (m, r, n) of
-        the right-hand sides and `answers` (m, k, n) of the columns."""
+        """Amplitudes (m, r, n) at s (m,) with modal damping.
+
+        They follow from the responses without it: x (m, r, n) to the right-hand sides, `answers`
+        (m, k, n) to the columns U.
+        """
         factor = s[:, None, None] * self.rates[:, None]
         matrix = np.eye(len(self.rates)) + factor * (answers @ self.columns).swapaxes(1, 2)
         with np.errstate(all="ignore"):
@@ -50,10 +53,10 @@ class ModalDamping:
 
 
 def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
-    """The damping of a model at rest.
+    """Modal damping of a model at rest.
 
-    Raises SceneError for ratios that make no sense, and for a model whose motions without damping
-    are no vibrations: one grows, or K has no potential.
+    Raises SceneError for invalid ratios, and where the undamped modes are no vibrations: a mode is
+    unstable, or K does not derive from a potential.
     """
     alone = np.ndim(ratios) == 0
     zeta = one_row("modal", [ratios] if alone else ratios)
@@ -77,7 +80,7 @@ def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
         )
     rates = 2 * zeta * found.omega
     damped = np.flatnonzero(rates)
-    if linear.mechanism is not None:  # the sweep's own mass is that of the tree, torn open
+    if linear.mechanism is not None:  # the mass matrix of the sweep is that of the spanning tree
         return ModalDamping(linear.M @ found.shapes[:, damped], rates[damped])
     mass = [linear.pencil.mass(found.shapes[:, k]) for k in damped]
     return ModalDamping(np.array(mass).reshape(len(damped), len(linear)).T, rates[damped])

@@ -1,4 +1,4 @@
-"""Peaks of frequency responses, between the frequencies that were asked for."""
+"""Peaks of frequency responses between the requested frequencies."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from mstmm.array_validation import Array
 from ..frequency_response import FrequencyResponse
 from ..modes import Complex
 
-#: Frequencies about each motion, in parts of it; and in parts of its damping ratio.
+#: Offsets of extra frequencies about each mode: relative to its frequency; relative to the product
+#: of its frequency and damping ratio.
 _BESIDE, _WITHIN = (0.0, 1e-4, 1e-3, 1e-2), (0.5, 1.0, 2.0)
-#: Damping ratio below which a motion counts as undamped, and how near it is approached.
+#: Damping ratio below which a mode counts as undamped; relative distance at which it is evaluated.
 _UNDAMPED, _NEAR = 1e-9, 1e-6
-#: Growth of a response at half the distance from a pole: 2; of one without a pole 1.
+#: Ratio of responses at half the distance from a pole that indicates one: 2 with a pole, else 1.
 _POLE = 1.5
-#: Points of a bracket, and how often it is refined: to 1e-7 of its width.
+#: Points of a bracket; number of refinements, down to 1e-7 of its width.
 _POINTS, _ROUNDS = 7, 14
 
 
 class Peaks(NamedTuple):
-    """Largest magnitudes (k,) of the first k pairs of an output and an input, row by row, and the
-    omega (rad/s) at which they are; infinite at a resonance without damping."""
+    """Peak `magnitude` (k,) and its `omega` (k,), rad/s, of the first k output-input pairs.
+
+    Pairs are in row-major order.  The magnitude is infinite at an undamped resonance.
+    """
 
     magnitude: Array
     omega: Array
@@ -36,9 +39,11 @@ def find_peaks(
     eigenvalues: Complex,
     count: int,
 ) -> Peaks:
-    """Largest magnitudes of `count` pairs over the range of a response on a `grid`, where `answer`
-    gives the response at other omega; near the `eigenvalues` (1/s) of the motions it is looked at
-    closely."""
+    """Peaks of the first `count` output-input pairs within the frequency range of `grid`.
+
+    `answer` evaluates the response at other omega, rad/s; the search is refined near the
+    `eigenvalues`, 1/s.
+    """
     low, high = float(grid.omega.min()), float(grid.omega.max())
     ratio = np.abs(eigenvalues.real) / np.maximum(np.abs(eigenvalues), np.finfo(float).tiny)
     centre = np.abs(eigenvalues.imag)
@@ -58,7 +63,7 @@ def find_peaks(
 
 
 def _beside(centre: Array, ratio: Array, low: float, high: float) -> Array:
-    """Frequencies in a range at and about those of damped motions."""
+    """Frequencies within (low, high), rad/s, at and about those of damped modes."""
     parts = [sign * x for sign in (1, -1) for x in _BESIDE]
     widths = [sign * x for sign in (1, -1) for x in _WITHIN]
     damped = ratio > _UNDAMPED
@@ -71,8 +76,10 @@ def _beside(centre: Array, ratio: Array, low: float, high: float) -> Array:
 def _refined(
     magnitudes: Callable[[Array], Array], omega: Array, values: Array, more: Array
 ) -> Peaks:
-    """The largest of `values` (m, k) at omega (m,) and at more frequencies, refined in their
-    brackets."""
+    """Peaks of `values` (m, k) at omega (m,) and of the responses at `more` frequencies.
+
+    Each peak is refined within the bracket of its neighbours.
+    """
     if len(more):
         omega, values = np.append(omega, more), np.concatenate([values, magnitudes(more)])
     order = np.argsort(omega)

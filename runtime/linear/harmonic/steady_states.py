@@ -1,9 +1,9 @@
-"""States that move: what a frequency response can be asked there.
+"""Validity of frequency responses about moving states.
 
-Increments go along with the motion, those of hinges in axes that turn.  They answer a push of one
-frequency with that frequency alone where neither the matrices nor the push, nor what is read,
-change along the motion or with time: an effort of a hinge stays what it is, a force with inertial
-components on a body that turns goes round, and so does the place of its end.
+Perturbations follow the motion, those of hinges in rotating axes.  The response to a harmonic input
+has the frequency of the input alone only if matrices, inputs and outputs are constant along the
+motion and over time.  Hinge efforts are constant; a force with inertial components on a rotating
+body is not, nor is the position of an end of that body.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def refuse_turning(linear: LinearEquations) -> None:
-    """SceneError for exact beams beside a state that turns a ball: they have no matrices."""
+    """Raise SceneError for exact beams about a state with rotating balls: no matrices exist."""
     if linear.turning is not None:
         raise SceneError(
             "exact: the state turns a ball, a free or another hinge whose rates go by its "
@@ -38,7 +38,7 @@ def refuse_turning(linear: LinearEquations) -> None:
 def refuse_unsteady(
     linear: LinearEquations, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]
 ) -> None:
-    """SceneError where what is asked changes along the motion of the state."""
+    """Raise SceneError where matrices, inputs or outputs change along the motion."""
     later = LaterStates(linear)
     if not linear.state.u.any() and not later.driven:
         return
@@ -55,8 +55,10 @@ def refuse_unsteady(
 
 
 def refuse_turning_outputs(linear: LinearEquations, shown: Sequence[LinearQuantity]) -> None:
-    """SceneError for outputs that change along a motion that is steady else: where it is not, the
-    risks of the linear model say so."""
+    """Raise SceneError for outputs that change along an otherwise steady motion.
+
+    Unsteady motions are reported by the risks of the linear model instead.
+    """
     if not linear.state.u.any():
         return
     later = LaterStates(linear)
@@ -72,7 +74,7 @@ def refuse_turning_outputs(linear: LinearEquations, shown: Sequence[LinearQuanti
 def find_time_risks(
     linear: LinearEquations, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]
 ) -> Iterator[Risk]:
-    """Inputs and outputs whose effects change with time."""
+    """Risks of inputs and outputs whose effects change with time."""
     known = {risk.element for risk in linear.risks}
     for name in find_changes(linear, LaterStates(linear), pushes, shown):
         if name != MATRICES and f'input "{name}"' not in known:

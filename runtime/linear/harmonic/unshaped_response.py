@@ -1,7 +1,8 @@
-"""Effect on a frequency response of beam directions that have no shape functions.
+"""Effect of beam directions without shape functions on a frequency response.
 
-A beam is rigid in a direction without shapes, so that a response that excites it is wrong at any
-frequency.  The same response of the scene with shapes there tells by how much.
+A beam is rigid in a direction without shape functions, so a response that excites this direction is
+wrong at any frequency.  Comparison with the response of the scene with added shape functions gives
+the error.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
     from ..operating_point.friction import Amplitudes
 
-#: Shapes that a direction gets, frequencies that are compared, and the relative change of a
-#: response that matters.
+#: Shape functions added to a direction, number of frequencies compared, and largest acceptable
+#: relative change of the response.
 _SHAPES, _FREQUENCIES, _CHANGE = 2, 7, 0.1
 
-#: Values (k, outputs, inputs) and their rounding (outputs, inputs) at frequencies (k,) in rad/s.
+#: Response (k, outputs, inputs) and its rounding error (outputs, inputs) at omega (k,), rad/s.
 Response = Callable[
     ["LinearEquations", Sequence[Channel], Array], tuple[NDArray[np.complex128], Array]
 ]
@@ -38,7 +39,7 @@ Response = Callable[
 
 @runtime_checkable
 class Linearisable(Protocol):
-    """Model with linear models about its states."""
+    """Model that can be linearised about its states."""
 
     def linearize(
         self, q: Array, u: Array, t: float, *, inputs: Sequence[str], friction: Amplitudes
@@ -48,7 +49,7 @@ class Linearisable(Protocol):
 def unshaped_response_risks(
     linear: LinearEquations, inputs: Sequence[Channel], omega: Array, response: Response
 ) -> Iterator[Risk]:
-    """Beams whose shapes lack a direction that changes the response at omega (k,) in rad/s."""
+    """Risks of beam directions without shapes that change the response at omega (k,), rad/s."""
     lacking = {
         name: directions
         for name, body in linear.model.flexible.items()
@@ -61,7 +62,7 @@ def unshaped_response_risks(
         fuller = _with_shapes(linear, inputs, lacking)
         given, _ = response(linear, inputs, omega[picked])
         expected, rounding = response(fuller, fuller.controls, omega[picked])
-    except MstmmError as failure:  # an undamped resonance, or a scene that is rejected with them
+    except MstmmError as failure:  # undamped resonance, or the scene rejects the added shapes
         yield information(
             "unexamined", "the response",
             f"not examined for directions of beams without shapes: {failure}",
@@ -86,7 +87,7 @@ def unshaped_response_risks(
 def _with_shapes(
     linear: LinearEquations, inputs: Sequence[Channel], lacking: Mapping[str, Sequence[str]]
 ) -> LinearEquations:
-    """The linear model at the same state, its beams with shapes in these directions too."""
+    """Linear model at the same state with shape functions added in the `lacking` directions."""
     model, state = linear.model, linear.state
     data = scene_data(model.scene)
     for beam in data["beam"]:
@@ -107,7 +108,7 @@ def _with_shapes(
 
 
 def _by_mode(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
-    """Coordinates or speeds of a model in the order of one whose beams have more shapes."""
+    """Coordinates or speeds of `model` in the order of `made`, zero for added shape functions."""
     slices = [getattr(slots, part) for slots in model.layout.modal.values()]
     hinges = min(one.start for one in slices)
     pieces = [values[:hinges]]
