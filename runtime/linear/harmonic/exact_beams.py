@@ -79,7 +79,7 @@ class ExactBeams:
 
     @property
     def slowest(self) -> float:
-        """Lowest characteristic frequency of the exact beams, rad/s."""
+        """Scale of the lowest frequency of the exact beams, rad/s."""
         return min(beam.frequency for beam in self.beams)
 
     def undamped(self) -> ExactBeams:

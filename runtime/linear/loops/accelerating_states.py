@@ -1,19 +1,19 @@
-"""What speeds do in closed loops beside a state that moves or does not last.
+"""Closed loops linearised about moving or accelerating states.
 
-Loops let all speeds be u = N(q) v with independent v.  Beside a state increments go along as
+Loops restrict all speeds to u = N(q) v with independent speeds v.  Perturbations of a state are
 dq = N x with x' = G_x x + dv, and
 
     du = N dv + S x,    S x = (dN along N x) v,    da = N dv' + B dv + T x.
 
-Accelerations a(q, u) that keep loops closed are N v' + b with b quadratic in the speeds, so that
-B, their slopes a_u N less what goes by independent ones, is twice a symmetric form of two speeds.
-S is that form but for the order of the two, in which increments do not commute where coordinates
-are no integrals of speeds (dphi' = G dphi + du):
+Accelerations a(q, u) that keep the loops closed are N v' + b with b quadratic in the speeds.  Hence
+B, the derivative a_u N less N times its independent rows, is twice a symmetric bilinear form of two
+speeds.  S is this form except for the order of its arguments: perturbations do not commute where
+coordinates are not integrals of the speeds (dphi' = G dphi + du), so that
 
     S = (B - G N + N G_x) / 2.
 
-Nothing in this takes a difference.  Rows of speeds that are no rates of any place (discs that roll)
-have no such symmetry; see `nonholonomic`.
+No finite differences are involved.  Nonholonomic rows (rolling discs) restrict speeds that are not
+rates of coordinates and lack this symmetry; see `nonholonomic`.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from ..mck_matrices import Matrices
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Slopes along n independent motions x and their speeds v.
+    """Derivatives with respect to n independent perturbations x and their speeds v.
 
     Attributes:
-        swept: (nu, n) S, speeds for a unit of each x at the same v.
-        going, placed: (n, n) of the independent accelerations by v and by x.
-        bent, shifted: (nu, n) B and T, what they leave of all accelerations.
-        turning: (n, n) G_x; None where x are integrals of v.
+        swept: (nu, n) S, change of all speeds for a unit of each x at the same v.
+        going, placed: (n, n) derivatives of the independent accelerations by v and by x.
+        bent, shifted: (nu, n) B and T, dependent parts of the derivatives of all accelerations.
+        turning: (n, n) G_x, 1/s; None where x are integrals of v.
     """
 
     swept: Array
@@ -46,8 +46,11 @@ class Motion:
 
     @classmethod
     def of(cls, slopes: Mapping[str, Array], places: Sequence[int], ways: Array) -> Motion:
-        """From the slopes (nu, nu) of accelerations along motions that keep loops closed, by the
-        names of `Derivatives`."""
+        """Build from derivatives (nu, nu) of accelerations that keep the loops closed.
+
+        `slopes` has the names of `Derivatives`, `places` are the indices of the n independent
+        speeds, `ways` is N (nu, n).
+        """
         own, by_speed, turned = list(places), slopes["u"] @ ways, slopes["rate_q"] @ ways
         bent = by_speed - ways @ by_speed[own]
         swept = (bent - turned + ways @ turned[own]) / 2
@@ -57,11 +60,11 @@ class Motion:
         return cls(swept, by_speed[own], by_place[own], bent, shifted, turning)
 
     def matrices(self, mass: Array) -> Matrices:
-        """M, C and K with the mass matrix M (n, n) along x: M dv' + C dv + K x = 0."""
+        """M, C, K of M dv' + C dv + K x = 0 from the mass matrix M (n, n) along x."""
         return Matrices(mass, -mass @ self.going, -mass @ self.placed)
 
     def below(self, order: int) -> Iterator[tuple[int, Array]]:
-        """(order, (nu, n)): what speeds (1) and accelerations (2) have besides of lower rates."""
+        """Lower-order terms (order, (nu, n)) of all speeds (1) or accelerations (2)."""
         if order == 1:
             yield 0, self.swept
         if order == 2:

@@ -1,18 +1,17 @@
-"""A scene with closed loops beside a state: its tree along the motions that loops leave.
+"""Linearisation of scenes with closed loops: spanning tree projected on independent motions.
 
-Torn open, the scene is a tree with R(q, u, a) the efforts that it needs; the loads of its loops,
-with multipliers lambda, make R + J^T lambda = 0.  Of independent motions x, dq = N x, and
-N^T J^T = 0 wherever the loops are closed, so that the equations are N^T R = 0 and their slopes at
-rest
+The spanning tree has the residual R(q, u, a), its required efforts; with the constraint loads,
+R + J^T lambda = 0.  Independent perturbations x give dq = N x, and N^T J^T = 0 wherever the loops
+are closed.  The equations are N^T R = 0, linearised at rest
 
     M = N^T R_a N,   C = N^T R_u N,   K = N^T (R_q + d(J^T lambda)/dq) N
 
-with lambda as it stands there: what turning loads add is K of the closed scene, whose tangent has
-the loads of its loops in it, less that of the tree.  Beside a state that moves or does not last
-C and K come from the slopes of its accelerations (`Motion`).
+with constant lambda.  The geometric stiffness of the constraint loads is K of the closed scene,
+whose tangent contains these loads, less K of the tree.  About a moving or accelerating state C and
+K follow from the derivatives of its accelerations (`Motion`).
 
-Where a drive goes by d, all else goes along: dq = N x + n d, x being zero in n, and what it asks
-for are the same slopes along n.
+A displacement d of a drive moves the other coordinates too: dq = N x + n d with zero entries of n
+at the independent coordinates.  The columns of the drive are the same derivatives along n.
 """
 
 from __future__ import annotations
@@ -35,24 +34,25 @@ from ..mck_matrices import Matrices, State, matrices
 from ..operating_point.friction import DryFriction
 from .accelerating_states import Motion
 
-#: Exact slopes (nu, nu) of the accelerations at a state, by the names of `Derivatives`.
+#: Exact derivatives (nu, nu) of the accelerations at a state, by the names of `Derivatives`.
 Slopes = Callable[[State], Mapping[str, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class ConstrainedLinearisation:
-    """The motions of a mechanism beside one state.
+    """Independent perturbations of a closed-loop scene at one operating point.
 
     Attributes:
-        tree: the scene with its loops open, with dry friction as the linear model has it.
-        free: places of the speeds of the tree that nobody imposes.
-        places: those of the n independent ones, which x are.
-        ways: (nu, n) all speeds for a unit of each.
-        turned: (n, n) stiffness of the loads that the loops carry, at rest.
-        motion: what speeds do where the state does not rest, from `slopes`.
-        rough: the tree with all its dry friction, whose slopes those are.
-        dry: what of it the tree has viscous dampers for.
-        model: whose mechanism it is.
+        model: the model of the scene.
+        tree: spanning tree of the scene, with dry friction as in the linear model.
+        free: indices of the speeds of the tree without prescribed motion.
+        places: indices of the n independent speeds, those of x.
+        ways: (nu, n) N, all speeds for a unit of each independent speed.
+        turned: (n, n) geometric stiffness of the constraint loads at rest.
+        motion: derivatives about a moving or accelerating state, from `slopes`; else None.
+        slopes: derivatives of the accelerations at a state; None at rest.
+        rough: spanning tree with all its dry friction, the basis of `slopes`.
+        dry: dry friction that viscous dampers replace in `tree`.
     """
 
     model: CompiledScene = field(repr=False)
@@ -68,17 +68,17 @@ class ConstrainedLinearisation:
 
     @property
     def turning(self) -> Array | None:
-        """(n, n) G of x' = G x + dv; None where x are integrals of the speeds v."""
+        """Matrix G (n, n), 1/s, of x' = G x + dv; None where x are integrals of the speeds v."""
         return None if self.motion is None else self.motion.turning
 
     def at(self, state: State) -> ConstrainedLinearisation | None:
-        """The same motions at another state."""
+        """The same linearisation at another state."""
         if self.slopes is None:
             return mechanism_at(self.model, state, self.dry)
         return moving_at(self.model, state, self.slopes, self.places, self.dry)
 
     def matrices(self, engine: LoopedEngine, state: State) -> Matrices:
-        """Those of the tree, or of it with other elements, along x."""
+        """Matrices M, C, K along x for the tree, or for an engine of it with other elements."""
         found = self._along(engine, state)
         if self.motion is None:
             return Matrices(found.M, found.C, found.K + self.turned)
@@ -86,7 +86,7 @@ class ConstrainedLinearisation:
         rough = self.rough or self.tree
         if engine is rough:
             return whole
-        tree = self._along(rough, state)  # what the loops carry is the same for both
+        tree = self._along(rough, state)  # the constraint loads are the same for both
         return Matrices(found.M, whole.C + found.C - tree.C, whole.K + found.K - tree.K)
 
     def _along(self, engine: LoopedEngine, state: State) -> Matrices:
@@ -94,7 +94,7 @@ class ConstrainedLinearisation:
         return _along(engine, state, self.free, self.ways, self.ways, swept)
 
     def pushed(self, state: State, channels: Sequence[Channel]) -> Array:
-        """(n, channels): what a unit of each push does along x, of drives their accelerations."""
+        """Efforts (n, channels) along x for a unit of each input; for drives, of acceleration."""
         every, found = list(range(len(self.ways))), np.zeros((len(self.places), len(channels)))
         still = [k for k, one in enumerate(channels) if one.drive < 0]
         pushes = [channels[k] for k in still]
@@ -105,7 +105,7 @@ class ConstrainedLinearisation:
         return found
 
     def driven(self, state: State, moves: Moves) -> Columns:
-        """Along x (n,): what drives that go along with one motion ask for."""
+        """Columns (n,) along x of stiffness, damping and inertia for drives moved by one input."""
         along = np.sum([factor * self._driving(state, speed) for speed, factor in moves], axis=0)
         closed, tree = self.model.looped, self.tree
         rows = _with_own_still(self.model, self.ways)
@@ -116,8 +116,10 @@ class ConstrainedLinearisation:
         )
 
     def _driving(self, state: State, speed: int) -> Array:
-        """n (nu,): all speeds for a unit of one that is imposed.  SceneError where loops do not let
-        it move, and beside a state that does not rest."""
+        """Vector n (nu,): all speeds for a unit of one prescribed speed.
+
+        Raises SceneError where the loops lock the drive, and about a state that is not at rest.
+        """
         if self.motion is not None:
             raise SceneError(
                 f'"{coordinate(self.model, speed)}": motions of drives of closed loops are inputs '
@@ -136,8 +138,10 @@ class ConstrainedLinearisation:
     def rows(
         self, state: State, orders: Mapping[int, Array], drives: Collection[int]
     ) -> dict[int, Array]:
-        """Rows (k, nu) of what goes with all speeds, by powers of s, as rows of x and of drives in
-        the places of these."""
+        """Output rows (k, nu) along x and drives from rows along all speeds, by power of s.
+
+        The entries of x and of drives are at the indices of their speeds.
+        """
         found, places = dict[int, Array](), list(self.places)
         for order, wide in orders.items():
             rows = found.setdefault(order, np.zeros_like(wide))
@@ -152,9 +156,11 @@ class ConstrainedLinearisation:
 def mechanism_at(
     model: CompiledScene, state: State, dry: DryFriction | None = None
 ) -> ConstrainedLinearisation | None:
-    """The mechanism at a state at rest, with viscous dampers for `dry` friction; None for a tree.
+    """Linearisation of the closed loops at a state at rest; None for a tree.
 
-    Raises NumericalFailure where loops leave no one set of motions.
+    Viscous dampers replace `dry` friction.
+
+    Raises NumericalFailure at a singular configuration.
     """
     if model.freedom is None:
         return None
@@ -168,10 +174,12 @@ def moving_at(
     model: CompiledScene, state: State, slopes: Slopes, places: tuple[int, ...] | None = None,
     dry: DryFriction | None = None,
 ) -> ConstrainedLinearisation | None:  # fmt: skip
-    """The mechanism at a state that moves or does not last, along independent speeds in `places`
-    or those that are well chosen there, with viscous dampers for `dry` friction; None for a tree.
+    """Linearisation of the closed loops at a moving or accelerating state; None for a tree.
 
-    Raises SceneError for scenes whose accelerations have no slopes, NumericalFailure as
+    The independent speeds are those at the indices `places`, by default a well-conditioned choice.
+    Viscous dampers replace `dry` friction.
+
+    Raises SceneError for scenes whose accelerations have no derivatives, NumericalFailure as
     `mechanism_at`.
     """
     if model.freedom is None:
@@ -183,7 +191,7 @@ def moving_at(
 def _mechanism(
     model: CompiledScene, state: State, places: tuple[int, ...], dry: DryFriction | None
 ) -> ConstrainedLinearisation:
-    """Without what its loads and its motion do."""
+    """Linearisation without the effects of constraint loads and of motion."""
     freedom = model.freedom
     assert freedom is not None
     ways, n = freedom.following(state.q, places), len(places)
@@ -194,7 +202,7 @@ def _mechanism(
 
 
 def torn_trees(model: CompiledScene, dry: DryFriction | None) -> tuple[LoopedEngine, LoopedEngine]:
-    """The scene with its loops open, and the same with viscous dampers for `dry` friction."""
+    """Spanning tree of the scene, and the same with viscous dampers for `dry` friction."""
     packed, system = model.packed, with_loops_open(model.packed.system)
     tree = LoopedEngine(packed_system(system, packed))
     if not dry:
@@ -208,7 +216,7 @@ def _along(
     engine: LoopedEngine, state: State, free: tuple[int, ...], ways: Array, rows: Array,
     swept: Array | None = None,
 ) -> Matrices:  # fmt: skip
-    """N^T (M, C, K) N, and of speeds that go along with x besides."""
+    """Projected matrices rows^T (M, C, K) ways; K includes the change `swept` of speeds with x."""
     found, n, left = matrices(engine, state, list(free)), ways[list(free)], rows[list(free)]
     mass, damping, stiffness = (left.T @ matrix @ n for matrix in (found.M, found.C, found.K))
     if swept is not None:
@@ -217,7 +225,7 @@ def _along(
 
 
 def _with_own_still(model: CompiledScene, ways: Array) -> Array:
-    """`ways` (nu, n) of the tree alone: what hinges that close loops do is load on their bodies."""
+    """`ways` (nu, n) with zero rows for cut hinges, whose loads act on their bodies instead."""
     system, rows = model.packed.system, ways.copy()
     for one in system.closures:
         first = int(system.places["u"][one.frame])

@@ -1,1 +1,1 @@
-"""Rotors: the fixed frame of spinning bodies."""
+"""Rotors: linear models in the fixed frame, multi-blade coordinates, unbalance response."""

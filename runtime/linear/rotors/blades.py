@@ -1,16 +1,17 @@
-"""Blades: three or more equal branches that spin with a hub, and their multi-blade coordinates.
+"""Multi-blade coordinates: three or more equal branches that spin with a hub.
 
-A coordinate of blade k of N is a sum of harmonics of the azimuth at which the blade stands,
+After Coleman and Feingold (1958) a coordinate of blade k of N is a sum of harmonics of the azimuth
+of the blade,
 
-    x_k(t) = sum over h of a_h(t) exp(i h (W t + 2 pi k / N)),  |h| <= N / 2,
+    x_k(t) = sum over h of a_h(t) exp(i h (W t + 2 pi k / N)),  |h| <= N / 2.
 
-after Coleman and Feingold (1958).  The same sum at the azimuths of the blades at t = 0,
+The same sum at the azimuths of the blades at t = 0,
 
     y_k(t) = sum over h of a_h(t) exp(2 pi i h k / N),
 
-is the pattern of the rotor as an observer sees it who does not turn.  Then y' = x' + R y with a
-circulant R, which turns harmonic h at the rate -h W; the mean of all blades, and of an even number
-the pattern of alternating signs, stay as they are.
+is the pattern of the rotor in the fixed frame.  Then y' = x' + R y with a circulant R, which turns
+harmonic h at the rate -h W.  The collective component (mean of all blades) and, for even N, the
+differential component (alternating signs) are unchanged.
 """
 
 from __future__ import annotations
@@ -30,20 +31,20 @@ if TYPE_CHECKING:
     from ...packing.packed_scene import PackedScene
     from ..linear_equations import LinearEquations
 
-#: Fewest blades whose coefficients stay constant in the fixed frame.
+#: Smallest number of blades with constant coefficients in the fixed frame.
 _FEWEST = 3
-#: Azimuths and distances from the axis that count as equal, in rad and in parts.
+#: Tolerance for equal azimuths (rad) and equal distances from the axis (relative).
 _EQUAL = 1e-6
 
 
 @dataclass(frozen=True)
 class Blades:
-    """Equal branches of one hub, in the order of their azimuths.
+    """Equal branches of one hub in the order of their azimuths.
 
     Attributes:
-        bodies: (blades, b) positions of their bodies in the tree.
-        coordinates: (blades, m) indices among the increments of a linear model.
-        speed: angular velocity of the hub, rad/s.
+        bodies: (blades, b) indices of their bodies in the tree.
+        coordinates: (blades, m) indices among the perturbations of a linear model.
+        speed: magnitude of the angular velocity of the hub, rad/s.
     """
 
     bodies: Integers
@@ -52,7 +53,7 @@ class Blades:
 
     @property
     def rates(self) -> Array:
-        """(blades, blades) R, 1/s, of one coordinate of all blades."""
+        """Circulant R (blades, blades), 1/s, of one coordinate of all blades."""
         count = len(self.coordinates)
         k = np.arange(count)
         h = np.arange(1, (count - 1) // 2 + 1)[:, None, None]
@@ -62,7 +63,10 @@ class Blades:
 
 @dataclass(frozen=True)
 class _Branch:
-    """A branch: its bodies by their positions in the tree, and its increments of a linear model."""
+    """Branch: indices of its `bodies` in the tree and of its perturbations; `form` identifies it.
+
+    Branches of equal `form` have the same hinges and free perturbations.
+    """
 
     bodies: tuple[int, ...]
     coordinates: tuple[int, ...]
@@ -70,7 +74,7 @@ class _Branch:
 
 
 def find_blades(linear: LinearEquations) -> list[Blades]:
-    """Groups of equal branches around spinning bodies, at equal angles about their axes."""
+    """Groups of equal branches on spinning hubs, equally spaced about the spin axis."""
     packed = linear.model.looped.packed
     points = _mass_centres(linear)
     found: list[Blades] = []
@@ -86,7 +90,7 @@ def find_blades(linear: LinearEquations) -> list[Blades]:
 
 
 def _branch(linear: LinearEquations, packed: PackedScene, root: int) -> _Branch:
-    """The branch from a body outwards; its form are the hinges and free increments, in order."""
+    """Branch outboard from body `root`; its form lists hinges and free perturbations in order."""
     bodies, coordinates, form = [], list[int](), list[object]()
     places = {speed: k for k, speed in enumerate(linear.free)}
     for place in _outwards(packed, root):
@@ -103,7 +107,7 @@ def _branch(linear: LinearEquations, packed: PackedScene, root: int) -> _Branch:
 
 
 def _outwards(packed: PackedScene, root: int) -> Iterator[int]:
-    """A body and all that hang on it, depth first."""
+    """Tree indices of a body and all bodies outboard of it, depth first."""
     waiting = [root]
     while waiting:
         place = waiting.pop()
@@ -112,7 +116,7 @@ def _outwards(packed: PackedScene, root: int) -> Iterator[int]:
 
 
 def _mass_centres(linear: LinearEquations) -> Array:
-    """(bodies, 24) of mass centres in the order of the tree, as of `Observation.points`."""
+    """Motion of the mass centres (bodies, 24) in tree order; columns of `Observation.points`."""
     packed, state, engine = linear.model.looped.packed, linear.state, linear.model.looped
     names = [packed.scene.bodies.name(body) for body in packed.topology.order]
     probes = [Probe(packed.end(name)[0], packed.end(name)[1], packed.mass_center(name))
@@ -122,8 +126,7 @@ def _mass_centres(linear: LinearEquations) -> Array:
 
 
 def _arranged(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
-    """The branches in the order of their azimuths about the axis of the hub, where these are equal
-    angles apart."""
+    """Branches ordered by azimuth about the spin axis of the hub; None if not equally spaced."""
     spin = points[hub, POINT_COLUMNS["angular_velocity"]]
     speed = float(np.linalg.norm(spin))
     if len(group) < _FEWEST or not speed:

@@ -1,4 +1,4 @@
-"""Displacements of bodies by the increments of a linear model, and the whirl of its motions."""
+"""Body displacements due to perturbations of a linear model, and whirl of its modes."""
 
 from __future__ import annotations
 
@@ -19,16 +19,18 @@ if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
     from ..linear_equations import LinearEquations
 
-#: Squares of sums of displacements that are rounding, in parts of those of the displacements.
+#: Squared sums of displacements that are rounding, relative to the squared displacements.
 _SEEN = 1e-18
-#: Momentum times speed that is none, in parts of the kinetic energy.
+#: Momentum times speed that counts as zero, relative to the kinetic energy.
 _NO_DRIFT = 1e-7
 
 
 def displacements(linear: LinearEquations, state: State) -> Array:
-    """(rows, n): twists of all bodies and of sections of beams for a unit of each increment, of the
-    point at the origin of inertial axes, which goes along with the mean motion; rotations count as
-    a length of the scene."""
+    """Twists (rows, n) of all bodies and beam sections for a unit of each perturbation.
+
+    In inertial axes, at a reference point that is the origin at t = 0 and moves with the drift
+    velocity.  Rotations are multiplied by the characteristic length of the scene.
+    """
     length = scene_length(linear.model)
     points = _points(linear, state, linear.spread(np.eye(len(linear))).T)
     place, velocity, spin = (points[..., POINT_COLUMNS[kind]] for kind in _KINDS)
@@ -38,9 +40,12 @@ def displacements(linear: LinearEquations, state: State) -> Array:
 
 
 def whirl(linear: LinearEquations, shapes: NDArray[Any]) -> Array:
-    """(k,) sense of the whirl of complex shapes (n, k) about the angular velocity of the body that
-    spins fastest: 1 forward along a circle, -1 backward, between these along ellipses, 0 in a
-    plane or along the axis.  Blades whirl by their sum, which is that of their mass centre."""
+    """Whirl sense (k,) of complex mode shapes (n, k) about the spin axis of the fastest body.
+
+    1 is forward circular whirl, -1 backward circular whirl, values in between are elliptic orbits,
+    and 0 is motion in a plane or along the axis.  Blades enter by the sum of their displacements,
+    which is that of their common mass centre.
+    """
     axis = _spin(linear)
     rows = (displacements(linear, linear.state) @ shapes).reshape(2, -1, 3, shapes.shape[1])
     summed = _sum_of_blades(linear, rows).reshape(-1, 3, shapes.shape[1])
@@ -53,7 +58,7 @@ def whirl(linear: LinearEquations, shapes: NDArray[Any]) -> Array:
 
 
 def _sum_of_blades(linear: LinearEquations, rows: NDArray[Any]) -> NDArray[Any]:
-    """(2, m, 3, k) of displacements (2, points, 3, k), of points of blades their sums."""
+    """Displacements (2, m, 3, k) from (2, points, 3, k), summed over the blades of a hub."""
     if not linear.state.u.any():
         return rows
     blades, bodies = find_blades(linear), _bodies_of_points(linear)
@@ -73,8 +78,10 @@ _KINDS = "position", "velocity", "angular_velocity"
 
 
 def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
-    """(m, points, 24), as of `Observation.points`, at speeds (m, nu): frames and ends of bodies,
-    of beams sections instead."""
+    """Point motion (m, points, 24) at speeds (m, nu); columns of `Observation.points`.
+
+    The points are the frames of all bodies, the ends of flexible bodies and the sections of beams.
+    """
     packed, engine = linear.model.looped.packed, linear.model.looped.inertia_alone
     bodies, flexible = linear.model.scene.skeleton.bodies, linear.model.flexible
     names = [bodies.name(k) for k in range(len(bodies))]
@@ -94,7 +101,7 @@ def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
 
 
 def _bodies_of_points(linear: LinearEquations) -> list[int]:
-    """Positions in the tree of the bodies of all `_points`."""
+    """Tree indices of the bodies of all `_points`."""
     end, bodies = linear.model.looped.packed.end, linear.model.scene.skeleton.bodies
     found = [end(bodies.name(k))[0] for k in range(len(bodies))]
     for name in linear.model.flexible:
@@ -110,14 +117,17 @@ def _beams(linear: LinearEquations) -> dict[str, ModalBody]:
 
 
 def _stations(body: ModalBody) -> Array:
-    """Where sections of a beam are seen, m."""
+    """Positions x of the observed sections of a beam, m."""
     assert body.shapes is not None
     length, count = body.shapes.length, body.shapes.n + 3
     return np.asarray(length * (1 - np.cos(np.linspace(0, np.pi, count))) / 2)
 
 
 def _sections(body: ModalBody, frame: Array, rates: Array) -> Array:
-    """(m, sections, 24) of a beam at rates (m, modes), on its undeformed axis."""
+    """Section motion (m, sections, 24) of a beam at modal rates (m, modes), on its straight axis.
+
+    `frame` (m, 24) is the motion of the body frame.
+    """
     shapes = body.shapes
     assert shapes is not None
     x = _stations(body)
@@ -135,7 +145,7 @@ def _sections(body: ModalBody, frame: Array, rates: Array) -> Array:
 
 
 def _drift(linear: LinearEquations) -> Array:
-    """(3,) velocity of the body that turns least, where the scene has linear momentum."""
+    """Drift velocity (3,), m/s: that of the body with least rotation; 0 without linear momentum."""
     state, engine = linear.state, linear.model.looped
     of = np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None]
     sums = engine.observe(*of, (), parts=("sums",)).sums[0]
@@ -149,7 +159,7 @@ def _drift(linear: LinearEquations) -> Array:
 
 
 def angular_velocity(linear: LinearEquations, name: str) -> Array:
-    """(3,) angular velocity of a body or end at the state, rad/s, inertial axes."""
+    """Angular velocity (3,) of a body or end at the operating point, rad/s, inertial axes."""
     engine, state = linear.model.looped, linear.state
     of = np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None]
     probe = Probe(*linear.model.looped.packed.end(name))
@@ -158,7 +168,7 @@ def angular_velocity(linear: LinearEquations, name: str) -> Array:
 
 
 def _spin(linear: LinearEquations) -> Array:
-    """(3,) unit vector of the largest angular velocity of a body, of the x axis without spin."""
+    """Unit vector (3,) of the largest angular velocity of a body; the x axis without spin."""
     turns = _points(linear, linear.state, linear.state.u[None])[
         0, :, POINT_COLUMNS["angular_velocity"]
     ]

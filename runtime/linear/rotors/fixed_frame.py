@@ -1,16 +1,16 @@
 """Linear models of spinning rotors in the fixed frame.
 
-Increments x of coordinates outboard of a spinning hinge turn along with the rotor.  At a steady
-spin the displacements that they make in inertial axes, twists d = P(t) x of all bodies, turn with
-it: where P(t) = P(0) T(t) with T(t) = exp(W t), the increments y = T x are those of the fixed
-frame, d = P(0) y.  In these
+Perturbations x of coordinates outboard of a spinning hinge rotate with the rotor.  At steady spin
+their displacements in inertial axes, twists d = P(t) x of all bodies, rotate too.  Where
+P(t) = P(0) T(t) with T(t) = exp(W t), the perturbations in the fixed frame are y = T x, with
+d = P(0) y.  They obey
 
-    M y'' + (C - 2 M W) y' + (K - C W + M W^2) y = pushes,
+    M y'' + (C - 2 M W) y' + (K - C W + M W^2) y = inputs,
 
-with the matrices of x at t = 0, and the coefficients stay constant where the rotors are
-axisymmetric, whatever their supports are: T^-T M(t) T^-1 = M(0), and likewise C and K.  Both
-conditions are tested a little further along the motion.  Coordinates of three or more equal blades
-have their own W, that of multi-blade coordinates.
+with the matrices of x at t = 0.  The coefficients are constant for axisymmetric rotors on any
+supports: T^-T M(t) T^-1 = M(0), and likewise for C and K.  Both conditions are checked at a later
+state of the motion.  Coordinates of three or more equal blades use the W of multi-blade
+coordinates.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from .later import SAME, ahead, later
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Displacements that count as the same, in parts; entries of matrices that are rounding, in parts.
+#: Relative tolerance for equal displacements; relative size of matrix entries that are rounding.
 _ALIKE, _ROUNDING = 1e-7, 1e-11
-#: Singular values of displacements below this, in parts, are those of a motion that is not seen.
+#: Relative singular value of displacements below which a perturbation is unobservable.
 _SEEN = 1e-9
 
 
 def frame_of(linear: LinearEquations) -> str:
-    """Frame of increments: "rotating" where they turn along with spinning bodies, else "fixed"."""
+    """Frame of the perturbations: "rotating" if they rotate with spinning bodies, else "fixed"."""
     return "rotating" if _is_rotating(linear) else "fixed"
 
 
@@ -52,9 +52,9 @@ def _is_rotating(linear: LinearEquations) -> bool:
 
 
 def carrying_at(linear: LinearEquations) -> Carrying:
-    """The transformation at the state of a linear model.
+    """Transformation to the fixed frame at the operating point of a linear model.
 
-    Raises SceneError where the rotor is not axisymmetric, saying why.
+    Raises SceneError with the reason where the rotor is not axisymmetric.
     """
     there = later(linear)
     dt = there.state.t - linear.state.t
@@ -74,7 +74,7 @@ def carrying_at(linear: LinearEquations) -> Carrying:
 
 
 def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -> Array:
-    """T of the later state, of the increments (m,) that are not of blades."""
+    """T (m, m) at the later state `there`, for the perturbations `others` (m,) outside blades."""
     now = displacements(linear, linear.state)[:, others]
     then = displacements(there, there.state)[:, others]
     size = np.linalg.norm(now, axis=0)
@@ -91,7 +91,7 @@ def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -
 
 
 def _refuse_asymmetric(linear: LinearEquations) -> None:
-    """SceneError where the matrices of y change along the motion."""
+    """Raise SceneError where the matrices of y change along the motion."""
     there = later(linear)
     scale = 1 / np.sqrt(np.abs(np.diag(linear.M)))
     mass, stiff = (_largest(one, scale) for one in (linear.M, linear.K))

@@ -1,4 +1,4 @@
-"""Linear equations a little further along a steady motion, for comparison."""
+"""Linear equations at a later state of a steady motion, to check for constant coefficients."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ..mck_matrices import State
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Matrices that still count as the same, in parts.
+#: Relative tolerance for equal matrices.
 SAME = 1e-6
-#: How far matrices are compared along the motion, in rad or sizes.
+#: Travel along the motion to the later state, in rad or characteristic scales.
 _AHEAD = 0.1
 
 
 def later(linear: LinearEquations) -> LinearEquations:
-    """The equations a little further along the motion."""
+    """Linear equations at the later state of the motion."""
     state, loops = ahead(linear), linear.mechanism
     loops = None if loops is None else loops.at(state)
     turning = linear.turning if loops is None else loops.turning
@@ -36,7 +36,7 @@ def later(linear: LinearEquations) -> LinearEquations:
 
 
 def ahead(linear: LinearEquations) -> State:
-    """The state a little further along the motion, with the same speeds."""
+    """Later state of the motion, at the same speeds."""
     model, state = linear.model, linear.state
     engine, memory = model.looped, model.looped.start_memory()
     dt = _AHEAD / float(np.abs(state.u).max())
@@ -50,6 +50,6 @@ def ahead(linear: LinearEquations) -> State:
 
 
 def apart(one: Array, other: Array) -> float:
-    """Largest difference, in parts of the largest entry."""
+    """Largest difference relative to the largest entry of the first array."""
     scale = float(np.abs(one).max(initial=0))
     return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0

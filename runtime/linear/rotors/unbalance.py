@@ -1,4 +1,4 @@
-"""Unbalance response of rotors over their spin."""
+"""Unbalance response of rotors over their spin speed."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, eq=False)
 class UnbalanceResponse(AssessedAnswer):
-    """Whirl of points under an unbalance m e that turns with a body, in the fixed frame.
+    """Whirl of points due to an unbalance m e that rotates with a body, in the fixed frame.
 
     Attributes:
         parameter, values: the parameter and its values (m,).
-        spin: (m,) rad/s of the body, the frequency of the whirl.
-        at, unbalance: the end that carries it, and m e in kg m.
-        points: names of the ends that are looked at.
-        displacements: (m, points, 3) complex, m in inertial axes: the motion is the real part of
-            displacements * exp(i spin t) while the unbalance turns from the first of `directions`
+        spin: (m,) spin speed of the body and frequency of the whirl, rad/s.
+        at, unbalance: end with the unbalance, and m e in kg m.
+        points: names of the observed ends.
+        displacements: (m, points, 3) complex, m, inertial axes: the motion is the real part of
+            displacements * exp(i spin t); the unbalance rotates from the first of `directions`
             towards the second.
-        directions: (2, 3) unit vectors across the spin.
+        directions: (2, 3) unit vectors normal to the spin axis.
     """
 
     parameter: str
@@ -54,14 +54,14 @@ class UnbalanceResponse(AssessedAnswer):
 
     @property
     def amplitude(self) -> Array:
-        """(m, points) major semi-axis of the orbits, m."""
+        """Major semi-axis (m, points) of the orbits, m."""
         d = self.displacements
         total, square = (np.abs(d) ** 2).sum(axis=2), np.abs((d * d).sum(axis=2))
         return np.sqrt((total + square) / 2)
 
     @property
     def minor_axis(self) -> Array:
-        """(m, points) minor semi-axis of the orbits, m; negative of backward whirl."""
+        """Minor semi-axis (m, points) of the orbits, m; negative for backward whirl."""
         d, across = self.displacements, self.directions
         along, beside = np.einsum("mpi,ki->kmp", d, across)
         total, square = (np.abs(d) ** 2).sum(axis=2), np.abs((d * d).sum(axis=2))
@@ -69,7 +69,7 @@ class UnbalanceResponse(AssessedAnswer):
         return np.asarray(sense * np.sqrt(np.maximum(total - square, 0.0) / 2))
 
     def plot(self, path: str | Path | None = None) -> Any:
-        """`matplotlib.figure.Figure`: amplitudes over the spin; written where `path` is given.
+        """Plot amplitudes over spin as a `matplotlib.figure.Figure`; save it to `path` if given.
 
         Raises EnvironmentFailure without the extra `plot`.
         """
@@ -78,7 +78,10 @@ class UnbalanceResponse(AssessedAnswer):
         return unbalance(self.spin, self.amplitude, self.points, path)
 
     def to_dataset(self) -> Any:
-        """`xarray.Dataset`, complex numbers in two parts.  EnvironmentFailure without the extra."""
+        """`xarray.Dataset` with displacements split into real and imaginary parts.
+
+        Raises EnvironmentFailure without the extra.
+        """
         along = ("value", "point", "axis")
         arrays: dict[str, Any] = {
             "spin": ("value", self.spin, {"units": "rad/s"}),
@@ -91,7 +94,7 @@ class UnbalanceResponse(AssessedAnswer):
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
-        """A row for each value of the parameter."""
+        """Header, then one row of text for each value of the parameter."""
         kinds = ("amplitude [m]", "minor axis [m]")
         yield (
             self.parameter,
@@ -103,9 +106,9 @@ class UnbalanceResponse(AssessedAnswer):
             yield tuple(repr(float(x)) for x in (value, spin, *row))
 
     def save(self, path: str | Path) -> Path:
-        """All of it: .nc (extra io) or .csv, a row for each value of the parameter.
+        """Save as .nc (extra io) or as .csv with one row for each value of the parameter.
 
-        Raises SceneError for another ending, EnvironmentFailure without the extra.
+        Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
         return file_formats.save(path, self.to_dataset, self._rows())
 
@@ -118,7 +121,7 @@ def unbalance_response(
     unbalance: float,
     points: Sequence[str],
 ) -> UnbalanceResponse:
-    """See `Model.unbalance_response`."""
+    """Unbalance response; see `Model.unbalance_response`."""
     size = finite_float("unbalance", unbalance, "m e in kg m")
     models = [linear_at(value).to_fixed_frame() for value in values.tolist()]
     places = [_end(models[0], name) for name in (at, *points)]
@@ -154,7 +157,7 @@ def _end(linear: Linear, name: str) -> str:
 
 
 def _across(axis: Array) -> Array:
-    """(2, 3) unit vectors across an axis, which turn into each other along it."""
+    """Unit vectors (2, 3) normal to an axis; with it they form a right-handed triad."""
     size = float(np.linalg.norm(axis))
     if not size:
         raise SceneError("unbalance response: the body does not spin at any value of the parameter")
@@ -166,7 +169,7 @@ def _across(axis: Array) -> Array:
 
 
 def _response(linear: Linear, spin: float, places: Sequence[str]) -> FrequencyResponse | None:
-    """Response of the points to forces at the first place, at the spin; None where it is 0."""
+    """Response of the points to forces at the first place, at the spin; None without spin."""
     if not spin:
         return None
     inputs = [f"{places[0]}.force.{axis}" for axis in "xyz"]
@@ -177,7 +180,7 @@ def _response(linear: Linear, spin: float, places: Sequence[str]) -> FrequencyRe
 def _whirl(
     response: FrequencyResponse | None, spin: float, unbalance: Array, count: int
 ) -> Complex:
-    """(points, 3) displacements under m e spin^2 that turns from the first direction on."""
+    """Displacements (points, 3), m, due to m e spin^2 rotating from the first direction."""
     if response is None:
         return np.zeros((count, 3), dtype=np.complex128)
     force = spin**2 * (unbalance[0] - 1j * unbalance[1])
