@@ -1,1 +1,1 @@
-"""Linear models beside motions with rolling contacts and rows of speeds."""
+"""Linear models of scenes with nonholonomic rows: rolling contacts, couplings of speeds."""

@@ -1,12 +1,12 @@
-"""Admissible perturbations beside a motion whose rows restrict speeds: rolling discs, knife edges.
+"""Admissible perturbations with nonholonomic rows: rolling discs, knife edges.
 
-Rows J(q) u = 0 restrict all speeds; those of them that belong to closed positions, J_h, restrict
-the increments of coordinates too, J_h phi = 0.  Of independent increments x and speeds v
+Rows J(q) u = 0 restrict all speeds.  The holonomic rows J_h restrict the perturbations of
+coordinates too, J_h phi = 0.  Independent perturbations x of positions and v of speeds give
 
     phi = P x,    du = N v + S x,    J N = 0,    J S x + d(J u)/dq phi = 0,
 
-so that there are more positions than speeds.  The last term is a central difference of eighth
-order, of an expression without loads; everything else is exact.
+so that there are more positions than speeds.  The derivative in the last equation is a central
+difference of eighth order of a load-free expression; everything else is exact.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ if TYPE_CHECKING:
     from ..mck_matrices import State
     from ..operating_point.friction import DryFriction
 
-#: Weights of a central difference by the number of steps, and its steps in sizes of coordinates.
+#: Weights of a central difference by number of steps; step sizes tried, in characteristic scales.
 _WEIGHTS = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}
 _STEPS = (1e-2, 1e-3, 1e-4)
-#: Rows that are rounding beside the largest.
+#: Relative size below which rows and speeds are rounding.
 _ROUNDING = 1e-9
 
 
 def has_speed_rows(model: CompiledScene) -> bool:
-    """Whether rows restrict speeds alone: discs that roll, couplings of speeds."""
+    """Whether the scene has nonholonomic rows: rolling discs, couplings of speeds."""
     scene = model.packed.described
     return any(one.type == ROLLING for one in scene.constraint) or any(
         one.speeds is not None for one in scene.coupling
@@ -47,12 +47,12 @@ def has_speed_rows(model: CompiledScene) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class RollingMechanism(ConstrainedLinearisation):
-    """Independent positions and speeds; `places` and `ways` are those of the positions, P (nu, n).
+    """Independent positions and speeds; `places` and `ways` P (nu, n) belong to the positions.
 
     Attributes:
-        speed_places: places of the m independent speeds v among all.
-        speed_ways: (nu, m) N, all speeds for a unit of each.
-        swept: (nu, n) S, speeds for a unit of each position at the same v.
+        speed_places: indices of the m independent speeds v.
+        speed_ways: (nu, m) N, all speeds for a unit of each v.
+        swept: (nu, n) S, change of all speeds for a unit of each position at the same v.
     """
 
     speed_places: tuple[int, ...] = ()
@@ -61,18 +61,20 @@ class RollingMechanism(ConstrainedLinearisation):
 
     @property
     def basis(self) -> Array:
-        """(2 nu, n + m): (phi, du) for a unit of each of (x, v)."""
+        """Basis (2 nu, n + m): (phi, du) for a unit of each of (x, v)."""
         nothing = np.zeros_like(self.speed_ways)
         return np.block([[self.ways, nothing], [self.swept, self.speed_ways]])
 
     @property
     def own(self) -> list[int]:
-        """Places of (x, v) in (phi, du)."""
+        """Indices of (x, v) in (phi, du)."""
         return [*self.places, *(len(self.ways) + k for k in self.speed_places)]
 
     def kept_speeds(self, q: Array, u: Array, rotation: Array) -> Array:
-        """Speeds (nu,) at q (nq,) that no row refuses, of which the independent ones are those of u
-        (nu,) in frames that the axes of bodies turn from by `rotation` (nu, nu) there."""
+        """Admissible speeds (nu,) at q (nq,) with the independent speeds of u (nu,) in the frames.
+
+        `rotation` (nu, nu) maps from the axes of the bodies at q to the frames.
+        """
         freedom, places = self.model.freedom, list(self.speed_places)
         assert freedom is not None
         wished = rotation.T @ u
@@ -82,7 +84,7 @@ class RollingMechanism(ConstrainedLinearisation):
         return np.asarray(found + rotation.T @ (ways @ np.linalg.solve(ways[places], missed)))
 
     def rows(self, state: State, orders: Mapping[int, Array], drives: object) -> dict[int, Array]:
-        """Rows (k, nu) of all increments, speeds and accelerations as they are."""
+        """Output rows (k, nu), unchanged: along all perturbations, speeds and accelerations."""
         return dict(orders)
 
     def matrices(self, *_: object) -> NoReturn:
@@ -99,7 +101,7 @@ class RollingMechanism(ConstrainedLinearisation):
 
 
 def refuse_second_order(found: RollingMechanism) -> NoReturn:
-    """SceneError for M, C, K and what follows from them."""
+    """Raise SceneError for M, C, K and quantities derived from them."""
     raise SceneError(
         f"linear model: rows of speeds leave {len(found.places)} positions and "
         f"{len(found.speed_places)} speeds here, which have no M, C, K, V and W; take A, B and "
@@ -114,11 +116,12 @@ def rolling_at(
     dry: DryFriction | None = None,
     own: tuple[tuple[int, ...], tuple[int, ...]] | None = None,
 ) -> RollingMechanism:
-    """Admissible perturbations at a state, along positions and speeds in the places `own`, or along
-    those that are well chosen there: of speeds, rather those at which `changing` (nu,) is zero.
-    Viscous dampers take the place of `dry` friction.
+    """Admissible perturbations at a state with nonholonomic rows.
 
-    Raises NumericalFailure where loops leave no one set of motions.
+    `own` are the indices of independent positions and speeds, by default a well-conditioned choice
+    that prefers speeds at which `changing` (nu,) is zero.  Viscous dampers replace `dry` friction.
+
+    Raises NumericalFailure at a singular configuration.
     """
     freedom = model.freedom
     assert freedom is not None
@@ -150,7 +153,7 @@ def rolling_at(
 
 
 class _Rows:
-    """J of the rows of one scene at q (nq,), and how J u changes with q."""
+    """Jacobian J (rows, nu) of the constraint rows at q (nq,), and derivative of J u by q."""
 
     def __init__(self, freedom: IndependentSpeeds, q: Array) -> None:
         self._freedom, self._q, self._sizes = freedom, q, freedom.sizes
@@ -159,7 +162,7 @@ class _Rows:
         self.of_positions = [k for k in range(len(self._J)) if k not in of_speeds]
 
     def allowed(self, rows: Sequence[int]) -> Array:
-        """(nu, n) a basis of the increments that some rows allow, orthonormal in sizes."""
+        """Basis (nu, n) of the null space of some rows, orthonormal in characteristic scales."""
         free = self._freedom.free
         scaled = (self._J * self._sizes)[np.ix_(rows, free)]
         _, lengths, across = np.linalg.svd(scaled)
@@ -169,7 +172,7 @@ class _Rows:
         return found
 
     def swept(self, ways: Array, u: Array) -> Array:
-        """(nu, n) speeds by which J u stays zero along increments `ways` (nu, n)."""
+        """Changes of speed (nu, n) that keep J u zero along perturbations `ways` (nu, n)."""
         free = self._freedom.free
         changes = np.reshape([self._change(way, u) for way in ways.T], (-1, len(self._J))).T
         scaled = (self._J * self._sizes)[:, free]
@@ -178,7 +181,7 @@ class _Rows:
         return np.asarray(found * self._sizes[:, None])
 
     def _change(self, way: Array, u: Array) -> Array:
-        """(rows,) d(J u)/dq along increments (nu,), by the step whose neighbour agrees best."""
+        """Derivative (rows,) of J u along a perturbation (nu,), with the most consistent step."""
         size = float(np.abs(way / self._sizes).max())
         tried = [self._difference(way, u, step / size) for step in _STEPS]
         apart = [np.abs(a - b).max(initial=0.0) for a, b in pairwise(tried)]

@@ -1,4 +1,4 @@
-"""Eigenvalues of state matrices with many zeros: coordinates on which nothing depends."""
+"""Eigenvalues of state matrices with zero eigenvalues of ignorable coordinates."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from mstmm.array_validation import Array
 
 Complex = NDArray[np.complex128]
 
-#: Entries of A that are rounding, in parts of the largest of their row, and the least of these in
-#: parts of the largest of all; parts of eigenvalues that are rounding.
+#: Entries of A that are rounding, relative to the largest of their row; lower bound of that largest
+#: entry, relative to the largest of all; real and imaginary parts of eigenvalues that are rounding.
 _NOTHING, _LEAST, _PART = 1e-9, 1e-6, 1e-8
 
 
 def eigenpairs(a: Array) -> tuple[Complex, Complex]:
-    """Eigenvalues (k,) of A (n, n) by rising size, of pairs the one above the real axis, and
-    vectors (n, k).  Coordinates on which nothing depends have eigenvalue 0, exactly."""
+    """Eigenvalues (k,) of A (n, n) by rising magnitude, and eigenvectors (n, k).
+
+    Of each conjugate pair only the eigenvalue above the real axis is kept.  Ignorable coordinates
+    have eigenvalue 0 exactly.
+    """
     core, ignorable = core_of(a)
     values, own = _without_zeros(a[np.ix_(core, core)])
     vectors = np.zeros((len(a), len(values)), dtype=np.complex128)
@@ -32,8 +35,11 @@ def eigenpairs(a: Array) -> tuple[Complex, Complex]:
 
 
 def _without_zeros(a: Array) -> tuple[Complex, Complex]:
-    """Eigenvalues and vectors of A (n, n): what it leaves at rest is taken out stage by stage, for
-    several zeros that belong together are known to their root of rounding alone."""
+    """Eigenvalues and eigenvectors of A (n, n), with the null space deflated stage by stage.
+
+    Deflation is needed since a defective zero eigenvalue is otherwise accurate only to a root of
+    the rounding error.
+    """
     still, across, lengths = np.eye(0), np.eye(0), np.zeros(0)
     if len(a):
         _, lengths, across = np.linalg.svd(_by_rows(a))
@@ -50,21 +56,24 @@ def _without_zeros(a: Array) -> tuple[Complex, Complex]:
 
 
 def _by_rows(a: Array) -> Array:
-    """A in parts of the largest of each row: some rows are of stiff parts, others of slow ones."""
+    """A with each row scaled by its largest entry, as stiff and slow parts differ in size."""
     largest = np.abs(a).max(axis=1, initial=0.0)
     floor = _LEAST * float(largest.max(initial=0.0)) or 1.0
     return np.asarray(a / np.maximum(largest, floor)[:, None])
 
 
 def _rounded(values: Complex) -> Complex:
-    """Eigenvalues without parts that are rounding."""
+    """Eigenvalues with real or imaginary parts at rounding level set to zero."""
     rounding = _PART * np.abs(values).max(initial=0.0)
     values = np.where(np.abs(values.imag) <= rounding, values.real, values)
     return np.where(np.abs(values.real) <= rounding, 1j * values.imag, values)
 
 
 def core_of(a: Array) -> tuple[list[int], list[int]]:
-    """Places that others depend on, and those on which none of what is left depends, in turn."""
+    """Indices of the coupled states, and of ignorable states in the order of their elimination.
+
+    No remaining state depends on an ignorable one.
+    """
     core, ignorable, scaled = list(range(len(a))), list[int](), np.abs(_by_rows(a))
     while True:
         for place in core:

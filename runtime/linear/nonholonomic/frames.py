@@ -1,10 +1,10 @@
-"""Frames that follow a steady motion in which bodies turn on and on.
+"""Reference frames in which a steady motion with rotating bodies has constant speeds.
 
-Increments and speeds of ball and free hinges are in the axes of their outboard body.  Beside a coin
-that rolls these axes go round, and with them the coefficients of its linear equations.  In a frame
-from which the axes turn by w the speeds u of a steady motion stand still, du/dt = -w x u in the
-axes of the body; that tells w, but for its part along all speeds.  A body that turns about one
-direction on the spot keeps its own axes.
+Perturbations and speeds of ball and free hinges are in the axes of their outboard body.  For a
+rolling coin these axes rotate, so that the coefficients of its linear equations vary.  The body
+axes rotate at w relative to a frame in which the speeds u of the steady motion are constant:
+du/dt = -w x u in the axes of the body.  This determines w except for a component parallel to all
+speeds.  A body that spins about a fixed direction on the spot keeps its own axes.
 """
 
 from __future__ import annotations
@@ -23,29 +23,32 @@ if TYPE_CHECKING:
     from ...packing.coordinate_layout import HingeSlots
     from ..mck_matrices import State
 
-#: Directions in which speeds say less than this part of their size about w.
+#: Relative threshold for rates w, and for directions in which the speeds do not determine w.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Frames:
-    """Hinge -> (3,) rad/s w of its outboard body's axes beside the frame of its increments, in
-    these axes, where it is not zero; `generator` (nu, nu) is w x of all speeds."""
+    """Angular velocities of body axes relative to the frames of perturbations and speeds.
+
+    `rates` maps a hinge to w (3,), rad/s, of its outboard body relative to the frame, in body axes;
+    hinges with zero w are left out.  `generator` (nu, nu), 1/s, is w x for all speeds.
+    """
 
     rates: Mapping[str, Array]
     generator: Array
 
     def twice(self) -> Array:
-        """(2 nu, 2 nu): of increments and speeds alike."""
+        """Generator (2 nu, 2 nu), 1/s, of perturbations and speeds."""
         return np.asarray(block_diag(self.generator, self.generator))
 
     def rotation(self, dt: float) -> Array:
-        """(nu, nu): axes of bodies after dt (s) -> frames."""
+        """Rotation (nu, nu) from the body axes after dt (s) to the frames."""
         return np.asarray(expm(dt * self.generator))
 
 
 def frames_at(model: CompiledScene, state: State) -> Frames:
-    """The frames in which the speeds of a state change least."""
+    """Frames in which the speeds of a state have the smallest rates of change."""
     rates, generator = dict[str, Array](), np.zeros((model.nu, model.nu))
     for slots in _turning(model):
         parts = [slice(k, k + 3) for k in range(slots.u, slots.u + slots.nu, 3)]
@@ -60,7 +63,7 @@ def frames_at(model: CompiledScene, state: State) -> Frames:
 
 
 def turns_in_space(model: CompiledScene, state: State, frames: Frames) -> bool:
-    """Whether a frame of a ball or free hinge turns beside the inboard body."""
+    """Whether a frame of a ball or free hinge rotates relative to the inboard body."""
     for slots in _turning(model):
         speeds = state.u[slots.u + slots.nu - 3 : slots.u + slots.nu]
         left = np.abs(speeds - frames.rates.get(slots.name, 0.0)).max()
@@ -70,13 +73,13 @@ def turns_in_space(model: CompiledScene, state: State, frames: Frames) -> bool:
 
 
 def _turning(model: CompiledScene) -> Iterator[HingeSlots]:
-    """Hinges with quaternions whose speeds are in the axes of their outboard bodies, turns last."""
+    """Quaternion hinges with speeds in axes of the outboard body, angular speeds last."""
     for slots in model.layout.hinges.values():
         if slots.quaternion is not None and slots.steady and slots.nu in (3, 6):
             yield slots
 
 
 def cross_matrix(v: Array) -> Array:
-    """(3, 3) of v x."""
+    """Cross-product matrix (3, 3) of v (3,)."""
     x, y, z = v
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,13 +1,13 @@
-"""Linear models beside motions with rolling contacts and rows of speeds: first order, A and B.
+"""First-order linear models (A, B) with nonholonomic rows: rolling contacts, coupled speeds.
 
-Of admissible perturbations (`admissible`) the independent positions x and speeds v make the
-state z = (x, v).  Rates and accelerations are linear in all increments and speeds, d/dt (phi, du) =
-F (phi, du), and (phi, du) = L z, of which z are the rows E.  In frames that the axes of bodies turn
-from by R, at the rate R W (`frames`),
+The state z = (x, v) holds the independent positions and speeds of the admissible perturbations
+(`admissible`).  Rates and accelerations are linear in all perturbations and speeds,
+d/dt (phi, du) = F (phi, du), with (phi, du) = L z and z = E (phi, du).  R rotates from the axes of
+the bodies to the frames, with dR/dt = R W (`frames`); in the frames
 
     A = E (W + R F R^T) L,
 
-whose entries last along a steady motion.
+with constant entries along a steady motion.
 """
 
 from __future__ import annotations
@@ -48,29 +48,29 @@ if TYPE_CHECKING:
     from ..outputs.output_rows import LinearQuantity
 
 Complex = NDArray[np.complex128]
-#: Exact slopes (nu, nu) at a state, by the names of `Derivatives`.
+#: Exact derivatives (nu, nu) at a state, by the names of `Derivatives`.
 Slopes = Callable[[State], Mapping[str, Array]]
 
-#: Accelerations (1/s^2, in sizes; and in parts of the squares of speeds) that are rounding.
+#: Accelerations that are rounding: in characteristic scales, 1/s^2; relative to squared speeds.
 _STILL, _ROUNDING = 1e-6, 1e-9
-#: How far coefficients are compared along the motion, in rad or sizes, and in how many steps.
+#: Travel along the motion to the later state, in rad or characteristic scales; number of steps.
 _AHEAD, _STEPS = 0.1, 8
-#: The condition of i omega - A at a resonance.
+#: Condition number of i omega - A that indicates an undamped resonance.
 _SINGULAR = 1e13
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NonholonomicLinear(Linear):
-    """d/dt (x, v) = A (x, v) + B inputs + B_disturbances w beside a motion with rolling contacts or
-    rows of speeds.
+    """Linear model about a motion with rolling contacts or other nonholonomic rows.
 
-    x (n,) are increments of independent positions, v (m,) independent speeds beside those of the
-    state, m below n.  M, C, K, V and W do not exist; they raise SceneError.
+    d/dt (x, v) = A (x, v) + B inputs + B_disturbances w, with perturbations x (n,) of independent
+    positions and v (m,) of independent speeds, m < n.  M, C, K, V and W do not exist and raise
+    SceneError.
 
     Attributes:
-        frames: in which increments and speeds of turning bodies are given, see `frame_rates`.
-        slopes: gives the slopes of rates and accelerations at a state.
-        rotation: (nu, nu) axes of bodies at the state -> frames; None at the start of both.
+        frames: frames of perturbations and speeds of rotating bodies, see `frame_rates`.
+        slopes: function that gives derivatives of rates and accelerations at a state.
+        rotation: (nu, nu) from the axes of bodies at the state to the frames; None: identity.
     """
 
     frames: Frames = field(default_factory=lambda: Frames({}, np.zeros((0, 0))))
@@ -94,33 +94,41 @@ class NonholonomicLinear(Linear):
 
     @property
     def positions(self) -> list[int]:
-        """Places of x in the state."""
+        """Indices of x in the state."""
         return list(range(len(self)))
 
     @property
     def velocities(self) -> list[int]:
-        """Places of v in the state."""
+        """Indices of v in the state."""
         return list(range(len(self), len(self.states)))
 
     @property
     def has_stiffness(self) -> bool:
-        """False: there is no K."""
+        """False: the model has no K."""
         return False
 
     @property
     def frame_rates(self) -> dict[str, Array]:
-        """Hinge -> (3,) rad/s: angular velocity of its outboard body beside the frame in which its
-        increments and speeds are given, in axes of the body; left out where that is the body."""
+        """Angular velocity (3,), rad/s, of outboard bodies relative to the frames, by hinge.
+
+        In axes of the body; perturbations and speeds of the hinge refer to the frame.  Hinges whose
+        frame is the body itself are left out.
+        """
         return dict(self.frames.rates)
 
     @cached_property
     def frame(self) -> str:
-        """ "fixed" where the frames do not turn in space, else "rotating": those of a disc that
-        rolls in a circle follow its heading."""
+        """Frame of the perturbations: "fixed" if no frame rotates in space, else "rotating".
+
+        The frame of a disc that rolls in a circle follows its heading.
+        """
         return "rotating" if turns_in_space(self.model, self.state, self.frames) else "fixed"
 
     def to_fixed_frame(self) -> NonholonomicLinear:
-        """The model itself.  SceneError where its frames turn in space."""
+        """The model itself if its frame is fixed.
+
+        Raises SceneError where its frames rotate in space.
+        """
         if self.frame == "fixed":
             return self
         raise SceneError(
@@ -132,7 +140,7 @@ class NonholonomicLinear(Linear):
 
     @cached_property
     def _slopes(self) -> Mapping[str, Array]:
-        """Slopes of rates and accelerations, with dry friction as the model has it."""
+        """Derivatives of rates and accelerations, with dry friction as in the model."""
         found, rolling = dict(self.slopes(self.state)), self._rolling
         if self.dry and rolling.rough is not None:
             free, left = list(rolling.free), np.zeros((self.model.nu, self.model.nu))
@@ -145,23 +153,23 @@ class NonholonomicLinear(Linear):
 
     @property
     def turned(self) -> Array:
-        """(nu, nu) R: increments or speeds in axes of bodies -> in frames."""
+        """Rotation R (nu, nu) of perturbations or speeds from body axes to the frames."""
         return np.eye(self.model.nu) if self.rotation is None else self.rotation
 
     @cached_property
     def _turned(self) -> Array:
-        """(2 nu, 2 nu): the same of increments and speeds."""
+        """Rotation (2 nu, 2 nu) of both perturbations and speeds."""
         return np.asarray(block_diag(self.turned, self.turned))
 
     @cached_property
     def _basis(self) -> Array:
-        """(2 nu, n + m) L in frames."""
+        """Basis L (2 nu, n + m) in the frames."""
         basis = self._turned @ self._rolling.basis
         return np.asarray(basis @ np.linalg.inv(basis[self._rolling.own]))
 
     @cached_property
     def A(self) -> Array:
-        """(n + m, n + m)."""
+        """State matrix (n + m, n + m)."""
         slopes, turned, basis = self._slopes, self._turned, self._basis
         both = np.block([[slopes["rate_q"], slopes["rate_u"]], [slopes["q"], slopes["u"]]])
         rates = self.frames.twice() @ basis + turned @ both @ (turned.T @ basis)
@@ -169,16 +177,16 @@ class NonholonomicLinear(Linear):
 
     @cached_property
     def B(self) -> Array:
-        """(n + m, inputs)."""
+        """Input matrix (n + m, inputs)."""
         return self._effect(self.controls)
 
     @cached_property
     def B_disturbances(self) -> Array:
-        """(n + m, disturbances): what w adds."""
+        """Input matrix (n + m, disturbances) of w."""
         return self._effect(self.others)
 
     def _effect(self, pushes: Sequence[Channel]) -> Array:
-        """(n + m, pushes): what a unit of each adds to d/dt (x, v)."""
+        """Input matrix (n + m, inputs) of some inputs."""
         if any(one.drive >= 0 for one in pushes):
             self._rolling.driven()
         nu, tree = self.model.nu, self._rolling.tree
@@ -190,8 +198,11 @@ class NonholonomicLinear(Linear):
         refuse_second_order(self._rolling)
 
     def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
-        """C (outputs, states) and D (outputs, pushes) of rows of increments, speeds and
-        accelerations, where `b` (states, pushes) is what pushes add to d/dt (x, v)."""
+        """Output matrices C (outputs, states) and D (outputs, inputs) of output rows.
+
+        `rows` are along perturbations, speeds and accelerations; `b` (states, inputs) is the input
+        matrix.
+        """
         increments, speeds = np.split(self._turned.T @ self._basis, 2)
         slopes = self._slopes
         along = (increments, speeds, slopes["q"] @ increments + slopes["u"] @ speeds)
@@ -202,15 +213,15 @@ class NonholonomicLinear(Linear):
                 d += wide @ speeds[:, self.velocities] @ b[self.velocities]
         return c, d
 
-    # --- what follows -----------------------------------------------------------------------------
+    # --- modes and frequency response -------------------------------------------------------------
 
     def modes(self, count: int | None = None, damped: bool | None = None) -> NonholonomicModes:
-        """Motions of (x, v): all, or the `count` slowest ones.
+        """Modes of (x, v): all, or the `count` slowest.
 
-        A coordinate on which nothing depends (a place on the road, a heading, the angle of a wheel)
-        is a motion of eigenvalue 0 by itself.
+        Each ignorable coordinate (position on the road, heading, angle of a wheel) is a mode of
+        eigenvalue 0.
 
-        Raises SceneError for a count that makes no sense, and where damping is to be left out.
+        Raises SceneError for an invalid count, and for `damped` false.
         """
         if damped is not None and not damped:
             raise SceneError("damped = False: A beside rolling contacts has no parts; leave it out")
@@ -235,10 +246,12 @@ class NonholonomicLinear(Linear):
         modal: Any = 0.0,
         exact: Any = False,
     ) -> FrequencyResponse:
-        """See `Linear.frequency_response`, of A and B; without damping beyond that of the scene and
-        exact beams.
+        """Frequency response of A and B; see `Linear.frequency_response`.
 
-        Raises SceneError where coefficients, inputs or outputs change along the motion.
+        Includes only the damping of the scene; exact beams are not available.
+
+        Raises SceneError for exact beams, for structural or modal damping about a moving state, and
+        where coefficients, inputs or outputs change along the motion.
         """
         refuse_in_motion(self, structural, modal)
         if exact is not False:
@@ -264,11 +277,11 @@ class NonholonomicLinear(Linear):
             )
         return np.asarray(np.linalg.solve(shifted, b), dtype=np.complex128)
 
-    # --- whether it lasts -------------------------------------------------------------------------
+    # --- validity ---------------------------------------------------------------------------------
 
     @cached_property
     def findings(self) -> tuple[Risk, ...]:  # type: ignore[override]
-        """Risks of the state, and of what a linear model leaves out."""
+        """Risks of the operating point and of effects that a linear model omits."""
         return tuple(self._find_risks())
 
     def _find_risks(self) -> Iterator[Risk]:
@@ -299,7 +312,7 @@ class NonholonomicLinear(Linear):
 
     @property
     def _ways(self) -> Ways:
-        """The motions of the independent speeds."""
+        """Motions along the independent speeds."""
         layout, rolling, places = self.model.layout, self._rolling, list(self._rolling.speed_places)
         hinges = [layout.hinge_of_speed(k) for k in places]
         units = [h.u_units[k - h.u].removesuffix("/s") for h, k in zip(hinges, places, strict=True)]
@@ -310,7 +323,7 @@ class NonholonomicLinear(Linear):
         )  # fmt: skip
 
     def _accelerating(self) -> list[str]:
-        """Independent speeds that change in the frames, here or a little further along."""
+        """Names of independent speeds that change in the frames, at this or the later state."""
         found, sizes = list[str](), speed_scales(self.model)
         for one in (self, self._later):
             state, places = one.state, [*self._rolling.speed_places]
@@ -321,22 +334,21 @@ class NonholonomicLinear(Linear):
         return list(dict.fromkeys(found))
 
     def _changes(self) -> bool:
-        """Whether A is another one a little further along the motion, but for coordinates on which
-        nothing depends."""
+        """Whether A differs at the later state, except for ignorable coordinates."""
         later = self._later.A
         kept = np.ix_(*2 * (sorted({*core_of(self.A)[0], *core_of(later)[0]}),))
         return apart(self.A[kept], later[kept]) > SAME
 
     @cached_property
     def _later(self) -> NonholonomicLinear:
-        """The model a little further along the motion, in the same frames."""
+        """Linear model at the later state of the motion, in the same frames."""
         model, own = self.model, self._rolling
         state, rotation = _ahead(self)
         rolling = rolling_at(model, state, None, self.dry, (own.places, own.speed_places))
         return replace(self, state=state, mechanism=rolling, rotation=rotation)
 
     def _refuse_unsteady(self, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]) -> None:
-        """SceneError where what is asked changes along the motion."""
+        """Raise SceneError where matrices, inputs or outputs change along the motion."""
         changing, there = [*self._accelerating()], self._later
         changing += ["the matrices"] if self._changes() else []
         now, then = (one._effect(pushes) for one in (self, there))
@@ -357,33 +369,33 @@ class NonholonomicLinear(Linear):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NonholonomicModes(Modes):
-    """Motions beside a motion with rolling contacts; `moved` (nu, k) are all speeds of each."""
+    """Modes about a motion with nonholonomic rows; `moved` (nu, k) are all speeds of each."""
 
     moved: Complex = field(default_factory=lambda: np.zeros((0, 0), dtype=np.complex128))
 
     @cached_property
     def frame(self) -> str:
-        """The frame of the frequencies, see `NonholonomicLinear.frame`."""
+        """Frame of the frequencies, see `NonholonomicLinear.frame`."""
         linear = self.linear
         assert isinstance(linear, NonholonomicLinear)
         return linear.frame
 
     def first(self, count: int) -> NonholonomicModes:
-        """The first of them."""
+        """The first `count` modes."""
         return replace(
             self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count],
             moved=self.moved[:, :count],
         )  # fmt: skip
 
     def kinetic(self) -> dict[str, Array]:
-        """Body -> (k,): its part of the kinetic energy of the speeds of each motion."""
+        """Share (k,) of each body in the kinetic energy of the modes, by body."""
         return energy_shares.kinetic_of_speeds(self.linear.model, self.linear.state.q, self.moved)
 
 
 def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
-    """The model beside the motion through the state of another one.
+    """Nonholonomic linear model about the motion through the state of `bare`.
 
-    Raises NumericalFailure where loops leave no one set of motions.
+    Raises NumericalFailure at a singular configuration.
     """
     model, state, dry = bare.model, bare.state, bare.dry
     frames = frames_at(model, state)
@@ -395,8 +407,10 @@ def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
 
 
 def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
-    """The state a little further along the motion, with the same independent speeds in the frames,
-    and the rotation (nu, nu) of the axes of bodies there into these."""
+    """Later state of the motion, at the same independent speeds in the frames.
+
+    Also returns the rotation (nu, nu) from the body axes at that state to the frames.
+    """
     model, state, frames = linear.model, linear.state, linear.frames
     engine, memory, rolling = model.looped, model.looped.start_memory(), linear._rolling
     dt = _AHEAD / float(np.abs(state.u / speed_scales(model)).max())
@@ -408,7 +422,7 @@ def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
     def rates(time: float, at: Array) -> Array:
         return np.asarray(engine.rates(state.t + time, at, speeds(time, at), memory))
 
-    for k in range(_STEPS):  # the classical method of fourth order
+    for k in range(_STEPS):  # classical fourth-order Runge-Kutta method
         one = rates(k * h, q)
         two = rates((k + 0.5) * h, q + h / 2 * one)
         three = rates((k + 0.5) * h, q + h / 2 * two)
