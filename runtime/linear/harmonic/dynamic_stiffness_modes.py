@@ -1,7 +1,7 @@
-"""Normal modes of scenes with exact beams by the Wittrick-Williams algorithm: none is missed.
+"""Complete normal modes of scenes with exact beams by the Wittrick-Williams algorithm.
 
-The number of undamped modes below omega is (Wittrick and Williams, Q. J. Mech. Appl. Math. 24
-(1971) 263-284)
+No mode is missed: the number of undamped modes below omega is (Wittrick and Williams, Q. J. Mech.
+Appl. Math. 24 (1971) 263-284)
 
     J(omega) = sum over exact beams of their clamped-clamped modes + negative pivots of the sweep.
 

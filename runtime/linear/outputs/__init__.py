@@ -1,1 +1,1 @@
-"""What a linear model shows: its outputs, and how each follows from its coordinates."""
+"""Outputs of linear models as rows of their coordinates."""

@@ -1,8 +1,7 @@
-"""What a linear model shows: quantities of results, and outputs of the scene, which may be
-expressions of them.
+"""Outputs of linear models: quantities of results, and outputs of the scene.
 
-An output of the scene follows from its quantities by the chain rule: the slopes of its expression
-at the state, times what the quantities do.
+An output of the scene may be an expression of quantities.  It follows by the chain rule: the
+derivatives of its expression at the operating point, times the rows of the quantities.
 """
 
 from __future__ import annotations
@@ -30,12 +29,13 @@ _AXES = "xyz"
 
 
 def outputs_of(linear: LinearEquations, names: Sequence[str] | None) -> list[LinearQuantity]:
-    """The outputs of names, or (None) those of the scene that linear models have, or all
-    coordinates: "shoulder.angle", "shoulder.angle_rate", of bodies and ends in inertial axes
-    "boom.tip.velocity.y" or short "boom.tip.vy", of springs "strut.length", and outputs of the
-    scene by their own names, of vectors each component.
+    """Outputs by name; None: available outputs of the scene, else all coordinates.
 
-    Raises SceneError for a name that is none of these, or that a moving state does not give.
+    Names are of hinges, "shoulder.angle" or "shoulder.angle_rate"; of bodies and ends in inertial
+    axes, "boom.tip.velocity.y" or short "boom.tip.vy"; of springs, "strut.length"; and of outputs
+    of the scene, a vector giving each component.
+
+    Raises SceneError for an unknown name, or one that is not available about a moving state.
     """
     shown = _Outputs(linear)
     if names is not None:
@@ -45,7 +45,7 @@ def outputs_of(linear: LinearEquations, names: Sequence[str] | None) -> list[Lin
 
 
 def read_by(linear: LinearEquations, names: Sequence[str] | None) -> list[str]:
-    """Names of quantities that outputs read, those of expressions too; None: of all the scene's."""
+    """Names of quantities that outputs and their expressions read; None: outputs of the scene."""
     scene = {output.name: output.of.names for output in linear.model.scene.output}
     found = list[str]()
     for name in scene if names is None else names_of("outputs", names):
@@ -54,7 +54,7 @@ def read_by(linear: LinearEquations, names: Sequence[str] | None) -> list[str]:
 
 
 def left_out(linear: LinearEquations) -> list[tuple[str, str]]:
-    """Outputs of the scene that linear models do not have, and why."""
+    """Outputs (name, reason) of the scene that are not available in the linear model."""
     shown, found = _Outputs(linear), []
     for output in linear.model.scene.output:
         try:
@@ -65,13 +65,16 @@ def left_out(linear: LinearEquations) -> list[tuple[str, str]]:
 
 
 class _Outputs:
-    """Looks up outputs of one linear model."""
+    """Lookup of outputs of one linear model by name."""
 
     def __init__(self, linear: LinearEquations) -> None:
         self.sight, self._known = QuantityLookup(linear), linear.model.scene.output
 
     def named(self, name: str) -> list[LinearQuantity]:
-        """What a name means; SceneError with the nearest one where it means nothing."""
+        """Quantities of a name.
+
+        Raises SceneError with the closest known name if the name is unknown.
+        """
         for output in self._known:
             if name == output.name or name.rpartition(".")[0] == output.name:
                 every = self.of_scene(output)
@@ -81,14 +84,14 @@ class _Outputs:
         return [self.sight.get(name)]
 
     def given(self, output: Output) -> list[LinearQuantity]:
-        """An output of the scene; none where linear models do not have it."""
+        """Quantities of an output of the scene; empty if not available in linear models."""
         try:
             return self.of_scene(output)
         except SceneError:
             return []
 
     def of_scene(self, output: Output) -> list[LinearQuantity]:
-        """An output of the scene; of a vector its components."""
+        """Quantities of an output of the scene; the components of a vector."""
         source = single_quantity_name(output)
         try:
             if not source:
@@ -109,8 +112,11 @@ def _renamed(found: LinearQuantity, output: Output, component: str) -> LinearQua
 
 @dataclass(frozen=True)
 class Rows:
-    """What outputs are of increments along all speeds, times powers of s: order -> (outputs, nu);
-    `through` (outputs, pushes) is what they have of pushes at once."""
+    """Output rows along all speeds, by power of s, and direct feedthrough.
+
+    `orders` maps the power of s to rows (outputs, nu) of perturbations; `through` (outputs, inputs)
+    is the direct feedthrough.
+    """
 
     orders: dict[int, Array]
     through: Array
@@ -119,7 +125,7 @@ class Rows:
 def rows_of(
     linear: LinearEquations, outputs: Sequence[LinearQuantity], pushes: Sequence[Channel]
 ) -> Rows:
-    """The rows of outputs under some pushes."""
+    """Rows of outputs for some inputs."""
     nu, shape = linear.model.nu, (len(outputs), linear.model.nu)
     parts = [(k, part) for k, one in enumerate(outputs) for part in one.parts]
     orders = {part.order: np.zeros(shape) for _, part in parts}
@@ -148,7 +154,7 @@ def rows_of(
 
 
 def _with_turning(linear: LinearEquations, orders: dict[int, Array]) -> dict[int, Array]:
-    """From speeds to x': where x' = G x + du, du = x' - G x and da = x'' - G x'."""
+    """Rows of x from rows of speeds, where x' = G x + du: du = x' - G x, da = x'' - G x'."""
     if linear.turning is None:
         return orders
     free, found = list(linear.free), {order: rows.copy() for order, rows in orders.items()}

@@ -1,4 +1,4 @@
-"""A quantity as a linear model sees it, and expressions of such by the chain rule."""
+"""Linearised quantities, and expressions of them by the chain rule."""
 
 from __future__ import annotations
 
@@ -15,8 +15,10 @@ from ..input_channels import Channel
 
 @dataclass(frozen=True)
 class Part:
-    """`factor` times a power `order` of s times a row: of speeds (place, number), or of how far
-    `push` reaches."""
+    """Term of a linearised quantity: `factor` times s to the power `order` times a row.
+
+    The row is given by entries (index, value) of `speeds`, or is the effort column of `push`.
+    """
 
     order: int
     speeds: tuple[tuple[int, float], ...] = ()
@@ -26,8 +28,11 @@ class Part:
 
 @dataclass(frozen=True)
 class LinearQuantity:
-    """A quantity: its name, unit and parts; `value` gives its number at the state, `through` what
-    of an input it has at once."""
+    """Linearised quantity as a sum of `parts`.
+
+    `value` returns its value at the operating point; `through` lists direct feedthrough as (input,
+    factor).
+    """
 
     name: str
     unit: str
@@ -39,9 +44,9 @@ class LinearQuantity:
 def formula(
     of: Expression, name: str, unit: str, read: Callable[[Name], LinearQuantity]
 ) -> LinearQuantity:
-    """An expression of quantities: its slopes at the state times what each of them does.
+    """Linearised expression: its derivatives at the operating point times those of quantities.
 
-    Raises SceneError where it has no slope there.
+    Raises SceneError where the expression is not differentiable there.
     """
     seen = {one: read(one) for one in of.names}
     numbers = {one: quantity.value() for one, quantity in seen.items()}
@@ -59,5 +64,5 @@ def formula(
 
 
 def scaled(parts: Sequence[Part], factor: float) -> Iterator[Part]:
-    """Parts, so many times."""
+    """Parts multiplied by `factor`."""
     return (replace(part, factor=factor * part.factor) for part in parts)

@@ -1,9 +1,8 @@
-"""Quantities of results in linear models: coordinates and their rates, motions of bodies and ends,
-springs, and inputs of the scene.
+"""Linearised quantities: hinge coordinates and rates, motion of ends, springs, scene inputs.
 
-Each is a row of numbers times a power of s, or some of them.  By duality a point goes along n with
-each coordinate as far as a unit force there along n pushes that coordinate, a body turns as far as
-a unit moment does, and a spring becomes longer as far as a unit of its effort does.
+Each is a sum of rows times powers of s.  By duality the displacement of a point along n for a unit
+of each coordinate equals the generalised efforts of a unit force along n at the point.  Likewise
+rotations of bodies follow from unit moments, and elongations of springs from unit spring efforts.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from .output_rows import LinearQuantity, Part, formula, scaled
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Quantities of ends: what pushes along them, and the power of s that makes them of a place.
+#: Quantities of ends: dual load, and power of s by which they follow from the position.
 _KINDS = {
     "position": ("force", 0), "velocity": ("force", 1), "acceleration": ("force", 2),
     "angular_velocity": ("moment", 1), "angular_acceleration": ("moment", 2),
@@ -44,7 +43,7 @@ _KINDS = {
 
 
 class QuantityLookup:
-    """Looks up quantities of one linear model by name."""
+    """Lookup of quantities of one linear model by name."""
 
     def __init__(self, linear: LinearEquations) -> None:
         self._linear, self._state = linear, linear.state
@@ -53,13 +52,16 @@ class QuantityLookup:
         self._springs = {one.name: k for k, one in enumerate(linear.model.scene.spring)}
 
     def read(self, name: Name) -> LinearQuantity:
-        """What a name in an expression is; the time stands still."""
+        """Quantity of a name in an expression; the time t is constant."""
         if name.text == "t":
             return LinearQuantity("t", "s", (), lambda: self._state.t)
         return self.get(name.text)
 
     def get(self, name: str) -> LinearQuantity:
-        """The quantity; SceneError with the nearest name where linear models have none of this."""
+        """Quantity of a name.
+
+        Raises SceneError with the closest known name if linear models have no such quantity.
+        """
         found = self.find(name)
         if found is None:
             coordinates = self._linear.coordinates or ("shoulder.angle",)
@@ -72,9 +74,9 @@ class QuantityLookup:
         return found
 
     def find(self, name: str) -> LinearQuantity | None:
-        """The quantity; None where linear models have none of this name.
+        """Quantity of a name; None if linear models have no such quantity.
 
-        Raises SceneError for what a moving state does not give.
+        Raises SceneError for quantities that are not available about a moving state.
         """
         owner, _, last = name.rpartition(".")
         if name in self._model.scene.channels:
@@ -88,7 +90,7 @@ class QuantityLookup:
         return self._of_end(name, owner, last)
 
     def known(self) -> Iterator[str]:
-        """Names, those of coordinates first."""
+        """Known names, coordinates first."""
         yield from self._linear.coordinates
         yield from self._model.scene.channels
         yield from (f"{spring}.{kind}" for spring in self._springs for kind in SPRING_QUANTITIES)
@@ -111,7 +113,7 @@ class QuantityLookup:
     # --- hinges -----------------------------------------------------------------------------------
 
     def _of_hinge(self, slots: HingeSlots, last: str) -> LinearQuantity | None:
-        """A coordinate, its rate or acceleration by name or number."""
+        """Coordinate, rate or acceleration of a hinge, by name or index; None if unknown."""
         state = self._state
         for k, speed in enumerate(slots.u_names):
             row, place = ((slots.u + k, 1.0),), slots.u + k
@@ -134,7 +136,7 @@ class QuantityLookup:
         return None
 
     def _follows(self, slots: HingeSlots, k: int) -> tuple[tuple[int, float], ...]:
-        """How coordinate k of a hinge goes with increments along its speeds."""
+        """Row (index, value) of coordinate k of a hinge along its speeds."""
         if slots.straight:
             return ((slots.u + k, 1.0),)
         engine, state = self._model.looped, self._state
@@ -148,7 +150,7 @@ class QuantityLookup:
     # --- ends -------------------------------------------------------------------------------------
 
     def _of_end(self, name: str, owner: str, last: str) -> LinearQuantity | None:
-        """A component of what a body or end does."""
+        """Component of the motion of a body or end in inertial axes; None if unknown."""
         for kind, (push, order) in _KINDS.items():
             about, end = BODY_QUANTITIES[kind], owner.removesuffix(f".{kind}")
             for axis, short in enumerate(about.short):
@@ -166,7 +168,7 @@ class QuantityLookup:
         return lambda: float(self._points([self._model.packed.end(end)])[0, column])
 
     def _points(self, ends: Sequence[tuple[int, tuple[float, ...], tuple[float, ...]]]) -> Array:
-        """(ends, 24) at the state, as of `Observation.points`."""
+        """Motion (ends, 24) at the operating point; columns of `Observation.points`."""
         engine, state = self._model.looped, self._state
         found = engine.observe(
             np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None],
@@ -203,13 +205,13 @@ class QuantityLookup:
         return self._effort(name, spring.law, number)
 
     def _motion(self, number: int) -> tuple[float, float]:
-        """Length in m and its rate."""
+        """Length of a spring, m, and its rate, m/s."""
         near, far = self._points(self._model.packed.system.forces[number].ends)
         length, rate = length_and_rate((far - near)[None, :6])
         return float(length[0]), float(rate[0])
 
     def _effort(self, name: str, law: SpringLaw, number: int) -> LinearQuantity:
-        """What stiffness and damping give, and the expression."""
+        """Effort of a spring: stiffness, damping and its effort expression."""
         length, rate = (self._of_spring(number, kind) for kind in ("length", "length_rate"))
 
         def read(one: Name) -> LinearQuantity:
@@ -230,7 +232,7 @@ class QuantityLookup:
 
 
 def _aliases(name: str, short: str, k: int, count: int) -> tuple[str, ...]:
-    """What results call an entry of a hinge: shoulder.angle, shoulder.q[0], shoulder.q."""
+    """Names of a hinge entry in results: angle, q[0], and q for a single entry."""
     return (name, f"{short}[{k}]", short) if count == 1 else (name, f"{short}[{k}]")
 
 

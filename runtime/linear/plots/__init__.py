@@ -1,1 +1,1 @@
-"""Pictures of linear models: their matrices, motions and answers (extra: plot)."""
+"""Plots of linear models: matrices, modes and responses (extra: plot)."""

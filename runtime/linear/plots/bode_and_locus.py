@@ -1,4 +1,4 @@
-"""Pictures of linear models: motions over a parameter, and answers over the frequency."""
+"""Plots of root loci over a parameter and of frequency responses."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from mstmm.array_validation import Array
 
 from .figure import figure, finish_axes, refuse_none, write
 
-#: Legends of more curves stand beside the picture.
+#: Largest number of curves with the legend inside the axes.
 _INSIDE = 4
-#: Lines of one colour that differ.
+#: Line styles of curves of the same colour.
 _DASHES = ("-", "--", ":", "-.")
-#: Names of curves at their ends are so far apart at least, in parts of the height.
+#: Smallest distance of labels at curve ends, relative to the height of the axes.
 _APART = 0.035
-#: Whirl beyond which a motion is called forward or backward.
+#: Whirl sense beyond which a mode is labelled forward or backward.
 _WHIRLS = 0.05
-#: Frequencies that reach further than this stand on a logarithmic scale.
+#: Ratio of largest to smallest frequency above which the axis is logarithmic.
 _DECADES = 30.0
 
 
@@ -34,7 +34,10 @@ def locus(
     frame: str,
     whirl: Array,
 ) -> Any:
-    """Frequencies and, where anything grows or decays, growth below; what grows is red."""
+    """Plot frequencies over a parameter and, if any is nonzero, growth rates below.
+
+    Unstable modes are red; `orders` adds lines of multiples of the parameter, dashed.
+    """
     frequencies, growths = np.abs(np.imag(eigenvalues)) / (2 * np.pi), np.real(eigenvalues)
     label = "frequency in Hz"
     if orders or frame == "rotating":
@@ -72,13 +75,15 @@ def locus(
 
 
 def _look(k: int) -> dict[str, Any]:
-    """Colour and dashes of curve `k`; forty differ."""
+    """Colour and line style of curve `k`, distinct for 40 curves."""
     return {"color": f"C{k % 10}", "ls": _DASHES[k // 10 % len(_DASHES)]}
 
 
 def _numbered(axis: Any, x: Array, columns: Array, whirl: Array) -> None:
-    """The number of every motion, from 1, at the end of its curve, with F where it whirls forward
-    and B where backward; those too near to one that stands already are left out."""
+    """Label every curve at its end with its mode number from 1, and F or B for its whirl.
+
+    F is forward whirl, B backward whirl.  Labels too close to an earlier one are left out.
+    """
     low, high = axis.get_ylim()
     taken: list[tuple[float, float]] = []
     for k, column in enumerate(columns.T):
@@ -100,7 +105,7 @@ def _sense(whirl: float) -> str:
 
 
 def _named(made: Any, axis: Any, labels: Sequence[str]) -> None:
-    """A legend where it hides no curve."""
+    """Add a legend, outside the axes for many curves, none for a single unlabelled one."""
     if len(labels) > _INSIDE:
         made.legend(*axis.get_legend_handles_labels(), loc="outside right upper", fontsize=8,
                     frameon=False)  # fmt: skip
@@ -115,8 +120,7 @@ def bode(
     units: str,
     path: str | Path | None,
 ) -> Any:
-    """Magnitude above, phase below, over the frequency in Hz; a curve for each column of `values`
-    (k, curves)."""
+    """Plot magnitude and phase over frequency, Hz, for each column of `values` (k, curves)."""
     refuse_none(values)
     made = figure(6.0)
     above, below = made.subplots(2, 1, sharex=True, height_ratios=[3, 2])
@@ -136,7 +140,7 @@ def bode(
 
 
 def nyquist(values: NDArray[Any], labels: Sequence[str], path: str | Path | None) -> Any:
-    """Curves (k, curves) in the complex plane."""
+    """Plot responses (k, curves) in the complex plane."""
     refuse_none(values)
     made = figure(5.5)
     axis = made.subplots()
@@ -154,7 +158,7 @@ def nyquist(values: NDArray[Any], labels: Sequence[str], path: str | Path | None
 
 
 def unbalance(spin: Array, amplitude: Array, labels: Sequence[str], path: str | Path | None) -> Any:
-    """Amplitudes (m, points) over the spin (m,)."""
+    """Plot amplitudes (m, points), m, over spin (m,), rad/s."""
     made = figure(4.5)
     axis, order = made.subplots(), np.argsort(spin, kind="stable")
     for k, (curve, label) in enumerate(zip(amplitude[order].T, labels, strict=True)):
@@ -171,7 +175,7 @@ def unbalance(spin: Array, amplitude: Array, labels: Sequence[str], path: str | 
 def waterfall(
     frequency: Array, rows: Array, values: NDArray[Any], about: str, path: str | Path | None
 ) -> Any:
-    """Magnitudes (rows, k) as colours over the frequency in Hz and another number."""
+    """Plot magnitudes (rows, k) as colours, dB, over frequency, Hz, and another quantity."""
     made = figure(5.0)
     axis = made.subplots()
     with np.errstate(divide="ignore"):

@@ -1,4 +1,4 @@
-"""Figures: made empty, settled, written."""
+"""Creation, formatting and saving of figures."""
 
 from __future__ import annotations
 
@@ -16,12 +16,18 @@ _FORMATS = (".png", ".svg", ".pdf")
 
 
 def figure(height: float = 4.5, width: float = 7.5) -> Any:
-    """An empty figure.  EnvironmentFailure without the extra."""
+    """Empty figure of a height and width in inches.
+
+    Raises EnvironmentFailure without the extra.
+    """
     return figure_class()(figsize=(width, height), layout="constrained")
 
 
 def write(made: Any, path: str | Path | None) -> None:
-    """The figure into a file (None: none); its ending says how.  SceneError for another ending."""
+    """Save the figure as .png, .svg or .pdf, by file extension; do nothing if `path` is None.
+
+    Raises SceneError for another extension.
+    """
     if path is None:
         return
     path = require_path(path)
@@ -32,13 +38,13 @@ def write(made: Any, path: str | Path | None) -> None:
 
 
 def refuse_none(values: NDArray[Any]) -> None:
-    """SceneError where there is no column of numbers to draw."""
+    """Raise SceneError if `values` has no column to draw."""
     if not values.shape[1]:
         raise SceneError("nothing moves in this scene, so that there is nothing to draw")
 
 
 def finish_axes(*axes: Any) -> None:
-    """A light grid, and no frame above and to the right."""
+    """Add a light grid and remove the top and right spines."""
     for axis in axes:
         axis.grid(alpha=0.3, which="both", lw=0.5)
         axis.spines[["top", "right"]].set_visible(False)

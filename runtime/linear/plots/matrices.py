@@ -1,4 +1,4 @@
-"""Pictures of the matrices of a linear model."""
+"""Plots of the matrices of a linear model."""
 
 from __future__ import annotations
 
@@ -14,17 +14,19 @@ from .figure import figure, refuse_none, write
 if TYPE_CHECKING:
     from ..state_space import StateSpace
 
-#: Coordinates up to which every row carries its name.
+#: Largest number of coordinates with a name on every row.
 _NAMED = 40
-#: Entries below this part of the largest are as good as zero in a picture.
+#: Size relative to the largest entry below which the colour scale is linear.
 _SMALL = 1e-5
-#: And so much smaller is what the marks between its ends stand for.
+#: Inner ticks of the colour bar, relative to the largest entry.
 _INNER = 1e-2
 
 
 def matrices(linear: StateSpace, path: str | Path | None) -> Any:
-    """M, C and K side by side, or A where there are none, each by its own colours, which go by
-    decades."""
+    """Plot M, C and K side by side, or A if they do not exist.
+
+    Each matrix has its own colour scale, logarithmic in both signs.
+    """
     drawn, names = ("MCK", linear.coordinates) if linear.has_stiffness else ("A", linear.states)
     refuse_none(getattr(linear, drawn[0]))
     named = len(names) <= _NAMED
@@ -45,7 +47,7 @@ def matrices(linear: StateSpace, path: str | Path | None) -> Any:
 
 
 def _unit(linear: StateSpace, name: str) -> str:
-    """Of the entries, where all coordinates have the same."""
+    """Unit of the entries; for coordinates of several units, that of the rows."""
     if name == "A":
         return "rates of rows per column"
     units = set(linear.units)
@@ -57,7 +59,10 @@ def _unit(linear: StateSpace, name: str) -> str:
 
 
 def _map(made: Any, panel: Any, matrix: Array) -> None:
-    """Entries as colours, red above zero and blue below, on a scale of decades both ways."""
+    """Draw entries as colours on a symmetric logarithmic scale.
+
+    The colour map is "RdBu_r": positive entries are red, negative ones blue.
+    """
     from matplotlib.colors import SymLogNorm
 
     top = float(np.abs(matrix).max())
@@ -71,4 +76,4 @@ def _map(made: Any, panel: Any, matrix: Array) -> None:
     bar.set_ticklabels([f"{x:.2g}" for x in (-top, -inner, 0, inner, top)])
     bar.ax.minorticks_off()
     bar.ax.tick_params(labelsize=8)
-    bar.ax.set_visible(not none)  # its place is kept, so that all three are of one size
+    bar.ax.set_visible(not none)  # hidden, not removed: equal panel sizes

@@ -1,4 +1,4 @@
-"""Natural motions as they move: each a stage of its own over one cycle, to choose on a page."""
+"""Animated modes: one selectable animation of a full cycle for each mode."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from .wireframe import amplitudes
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Pictures of a cycle, and how long it takes on the screen, s.
+#: Number of frames of a cycle, and its duration on screen, s.
 _PICTURES, _LASTS = 41, 2.0
-#: How far the point that moves most moves, in parts of the scene's size; what only turns about its
-#: own axis turns by so much, and nothing by more than the latter (rad).
+#: Largest displacement of a point, relative to the size of the scene; rotation of bodies that only
+#: rotate about their own axis, rad; largest rotation, rad.
 _PART, _TURNS, _MOST = 0.08, 0.5, 0.8
 _GREY = (150, 155, 162)
 
@@ -43,7 +43,7 @@ def view(
     amplitude: float | None,
     title: str,
 ) -> SceneView:
-    """See `Modes.view`."""
+    """Animated 3D view of modes; see `Modes.view`."""
     part = _PART if amplitude is None else amplitude
     phases = np.linspace(0.0, 360.0, _PICTURES)
     when = FrameTimes(np.arange(_PICTURES), phases, phases, 360.0 / _LASTS)
@@ -60,7 +60,7 @@ def view(
 
 
 def _amplitude(linear: LinearEquations, shape: Array, part: float) -> float:
-    """What a shape is multiplied with, so that it is seen and turns nothing too far."""
+    """Factor of a shape for visible displacements and limited rotations."""
     both = np.stack([np.real(shape), np.imag(shape)], axis=1)
     found = amplitudes(linear, both, part)
     turns = np.array([unit == "rad" for unit in linear.units])
@@ -72,18 +72,18 @@ def _amplitude(linear: LinearEquations, shape: Array, part: float) -> float:
 
 
 def _closed(linear: LinearEquations, q: Array) -> Array:
-    """The nearest positions in which loops are closed."""
+    """Nearest coordinates q (nq,) with closed loops; q itself if assembly fails."""
     closed = linear.model.closed
     if closed is None:
         return q
     try:
         return closed.assembled(q, np.zeros(linear.model.nu), (), ())[0]
-    except SceneError:  # so far it does not go: it is drawn as the shape says
+    except SceneError:  # out of reach for the loops: draw the linear displacement
         return q
 
 
 def _standing(linear: LinearEquations, q: Array) -> Result:
-    """Positions (f, nq) as a run that stands still in each, at the time of the state."""
+    """Result of coordinates q (f, nq) as frames without speed, at the time of the state."""
     model, count, t = linear.model, len(q), linear.state.t
     memory = np.tile(model.looped.start_memory(), (count, 1))
     none: dict[str, Any] = {one.name: 0 for one in fields(Statistics)}
@@ -94,7 +94,7 @@ def _standing(linear: LinearEquations, q: Array) -> Result:
 
 
 def _rest(linear: LinearEquations) -> Solid:
-    """Bodies where they are at rest, clear."""
+    """Transparent bodies at the operating point."""
     still = _standing(linear, linear.state.q[None])
     zero = np.zeros(1)
     stage = build_scene_graph(

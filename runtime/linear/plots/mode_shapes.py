@@ -1,4 +1,4 @@
-"""Pictures of natural motions: shapes of the scene, and eigenvalues in their plane."""
+"""Plots of modes: shapes of the scene, and eigenvalues in the complex plane."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 Complex = NDArray[np.complex128]
 
-#: The largest displacement that is drawn, in parts of the scene's size.
+#: Largest displacement drawn, relative to the size of the scene.
 _PART = 0.15
-#: Scenes of more hinges are drawn without dots at them; of more than the latter they are small, and
-#: none at rest, for they would hide the shape.
+#: Largest number of hinges drawn as dots; largest number drawn as large dots, and also at rest,
+#: where more dots would hide the shape.
 _DOTTED, _FEW = 60, 12
 _BLUE, _GREY, _RED = "#0072B2", "#9a9a9a", "#D55E00"
-#: Eigenvalues that carry their numbers, and lines of equal damping.
+#: Number of eigenvalues with a label; damping ratios of the lines of constant damping.
 _NUMBERED, _RATIOS = 40, (0.01, 0.05, 0.2)
-#: Frequencies that reach further than this are drawn by their decades, and growth with them.
+#: Ratio of largest to smallest frequency above which both axes are logarithmic.
 _SPREAD = 50.0
-#: Eigenvalues nearer than this, in parts of the picture, share the number of the first.
+#: Distance, relative to the axes, below which only the first of several eigenvalues is labelled.
 _CLOSE = 0.03
 
 
@@ -40,7 +40,7 @@ def shapes(
     which: Sequence[int],
     path: str | Path | None,
 ) -> Any:
-    """A panel for each motion of `which`: the scene at rest (grey, dashed) and displaced."""
+    """Plot a panel for each mode of `which`: the scene at rest (grey, dashed) and displaced."""
     refuse_none(shapes)
     columns = min(3, len(which)) if len(which) != 4 else 2
     rows = -(-len(which) // columns)
@@ -57,7 +57,7 @@ def shapes(
 
 
 def described(value: complex) -> str:
-    """Frequency and damping, or growth."""
+    """Text of frequency and damping ratio, or of growth rate, for an eigenvalue, 1/s."""
     if value == 0:
         return "0 Hz, moves freely"
     if value.imag == 0:
@@ -107,8 +107,11 @@ def _draw(
 
 
 def _plane(rest: Array, moved: Array) -> tuple[int, int]:
-    """The axis along which most moves, and that along which the scene, or the motion of one that is
-    a point, reaches furthest besides; in the order x, y, z."""
+    """Axes of the plane to draw, in the order x, y, z.
+
+    These are the axis of the largest displacement, and of the others that with the largest extent
+    of the scene; for a point-like scene, of its displacement.
+    """
     moves = np.abs(moved - rest).max(axis=0)
     reach = np.ptp(rest, axis=0)
     first = int(np.argmax(moves)) if moves.any() else int(np.argmax(reach))
@@ -119,7 +122,7 @@ def _plane(rest: Array, moved: Array) -> tuple[int, int]:
 
 
 def eigenvalues(values: Complex, path: str | Path | None) -> Any:
-    """Eigenvalues in the complex plane; those that grow are red."""
+    """Plot eigenvalues in the complex plane; unstable ones are red."""
     refuse_none(values[None])
     made = figure(5.0)
     axis = made.subplots()
@@ -143,13 +146,13 @@ def eigenvalues(values: Complex, path: str | Path | None) -> Any:
 
 
 def _spread(imaginary: Array) -> float:
-    """The largest frequency over the smallest."""
+    """Ratio of the largest to the smallest positive frequency."""
     positive = imaginary[imaginary > 0]
     return float(positive.max() / positive.min()) if len(positive) else 1.0
 
 
 def _by_decades(axis: Any, real: Array, imaginary: Array) -> None:
-    """Both axes by decades but for that below the smallest number on them."""
+    """Make both axes logarithmic, but linear below the decade of the smallest value."""
     slowest, least = _decade_below(imaginary[imaginary > 0]), _decade_below(np.abs(real[real != 0]))
     axis.set_xscale("symlog", linthresh=least)
     axis.set_yscale("symlog", linthresh=slowest)
@@ -163,7 +166,7 @@ def _decade_below(numbers: Array) -> float:
 
 
 def _widened(axis: Any, real: Array, imaginary: Array) -> None:
-    """Limits with the axis of what neither grows nor decays inside."""
+    """Set axis limits that include the imaginary axis."""
     top = max(float(imaginary.max(initial=0)), 0.0) or 1.0
     left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
     width = (right - left) or 0.1 * top
@@ -172,7 +175,7 @@ def _widened(axis: Any, real: Array, imaginary: Array) -> None:
 
 
 def _apart(axis: Any, values: Complex) -> list[int]:
-    """Those that are not on top of one before them in the picture."""
+    """Indices of eigenvalues that do not overlap an earlier one in the plot."""
     places = (axis.transScale + axis.transLimits).transform(
         np.column_stack([values.real, values.imag])
     )
@@ -184,8 +187,10 @@ def _apart(axis: Any, values: Complex) -> list[int]:
 
 
 def _rays(axis: Any, slowest: float) -> None:
-    """Lines of equal damping that cross the picture, `slowest` the frequency above which it shows
-    decades, or 0."""
+    """Draw lines of constant damping ratio across the plot.
+
+    `slowest` is the frequency above which the axis is logarithmic, or 0 for a linear axis.
+    """
     left, _ = axis.get_xlim()
     _, top = axis.get_ylim()
     for ratio in _RATIOS:

@@ -1,7 +1,7 @@
-"""A scene as lines: bodies from where they are held to their ends, beams along their axes, springs.
+"""Wireframe of a scene: bodies from hinge to ends, beams along their axes, springs.
 
-What moves is drawn as the linear model sees it, every point along its own straight line: the
-difference of two poses next to each other, enlarged.
+Displacements are those of the linear model: every point moves along a straight line, by the scaled
+difference of two adjacent poses.
 """
 
 from __future__ import annotations
@@ -21,18 +21,21 @@ from ...result.flexible import motion as observe
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
-#: Speeds of a hinge that holds nothing.
+#: Number of speeds of a hinge without constraints.
 _FREE = 6
-#: Points along a beam.
+#: Number of points along a beam.
 _FINE = 61
-#: Largest increment of a coordinate by which poses differ: small beside rounding and curvature.
+#: Largest perturbation of a coordinate between adjacent poses: rounding and curvature are small.
 _STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Outline:
-    """Lines of a scene, each (m, 3) in m, inertial axes: `bodies` and `springs`; `joints` (k, 3)
-    are where hinges hold bodies, `ground` (k, 3) where they hold on the ground."""
+    """Lines of a scene in m, inertial axes.
+
+    `bodies` and `springs` are lines (m, 3), `joints` (k, 3) the hinge positions on outboard bodies,
+    `ground` (k, 3) those of hinges on the ground.
+    """
 
     bodies: list[Array]
     springs: list[Array]
@@ -41,11 +44,11 @@ class Outline:
 
     @property
     def points(self) -> Array:
-        """(n, 3) of all lines and joints."""
+        """Points (n, 3) of all lines, joints and ground hinges, m."""
         return np.concatenate([*self.bodies, *self.springs, self.joints, self.ground])
 
     def moved(self, other: Outline, scale: float) -> Outline:
-        """The same, every point moved to the other's place and beyond: `scale` times as far."""
+        """Outline with every point moved by `scale` times its displacement to the other outline."""
 
         def along(one: Array, there: Array) -> Array:
             return one + scale * (there - one)
@@ -62,14 +65,19 @@ class Outline:
 def deformed_outlines(
     linear: LinearEquations, shapes: Array, part: float
 ) -> tuple[Outline, list[Outline]]:
-    """(at rest, moved by each of the real shapes (n, k)), the largest displacement of a point being
-    a `part` of the scene's size."""
+    """Outline at the operating point, and outlines displaced by each of the real shapes (n, k).
+
+    The largest displacement of a point is `part` times the size of the scene.
+    """
     rest, near, scales = _near(linear, shapes, _steps(shapes), part)
     return rest, [rest.moved(one, scale) for one, scale in zip(near, scales, strict=True)]
 
 
 def amplitudes(linear: LinearEquations, shapes: Array, part: float) -> Array:
-    """(k,) what real shapes (n, k) are to be multiplied with for that; 0 where no point moves."""
+    """Factors (k,) of real shapes (n, k) for a largest displacement of `part` times the size.
+
+    0 where no point moves.
+    """
     steps = _steps(shapes)
     return steps * np.array(_near(linear, shapes, steps, part)[2])
 
@@ -81,7 +89,10 @@ def _steps(shapes: Array) -> Array:
 def _near(
     linear: LinearEquations, shapes: Array, steps: Array, part: float
 ) -> tuple[Outline, list[Outline], list[float]]:
-    """At rest, moved a little by each shape, and how many times as far it is to be."""
+    """Outline at the operating point, outlines displaced by small steps, and scale factors.
+
+    A scale factor enlarges the largest displacement to `part` times the size of the scene.
+    """
     states = [linear.state.q, *(linear.displaced(x) for x in (shapes * steps).T)]
     rest, *near = outlines(linear, np.array(states))
     size = float(np.linalg.norm(np.ptp(rest.points, axis=0)))
@@ -90,12 +101,12 @@ def _near(
     return rest, near, scales
 
 
-#: Displacements below this, beside what a turn of the whole scene makes, are none.
+#: Negligible displacements, relative to those of a rotation of the whole scene by the same step.
 _SEEN = 1e-7
 
 
 def outlines(linear: LinearEquations, q: Array) -> list[Outline]:
-    """The scene at coordinates q (n, nq), one by one."""
+    """Outlines of the scene at each of the coordinates q (n, nq)."""
     sight = _Sight(linear, q)
     bodies, springs = list(sight.bodies()), list(sight.springs())
     joints, ground = sight.joints(), sight.ground()
@@ -106,7 +117,7 @@ def outlines(linear: LinearEquations, q: Array) -> list[Outline]:
 
 
 class _Sight:
-    """Where everything is at n states, each reference seen once."""
+    """Positions of all bodies and ends at n states, each observed once."""
 
     def __init__(self, linear: LinearEquations, q: Array) -> None:
         self.model, self.q = linear.model, q
@@ -123,7 +134,7 @@ class _Sight:
         self.at = dict(zip([*names, *ends], self._seen([*names, *ends]), strict=True))
 
     def _seen(self, references: Sequence[str]) -> Array:
-        """(references, n, 24) as of `Observation.points`."""
+        """Motion (references, n, 24) of bodies and ends; columns of `Observation.points`."""
         return self._observed([Probe(*self.packed.end(one)) for one in references])
 
     def _observed(self, probes: list[Probe]) -> Array:
@@ -134,7 +145,7 @@ class _Sight:
         return np.moveaxis(seen.points, 1, 0)
 
     def bodies(self) -> Iterator[Array]:
-        """(n, m, 3) lines of bodies, and from the ends that carry others to where they are held."""
+        """Lines (n, m, 3) of bodies, and lines from inboard to outboard ends of hinges."""
         for name in self.names:
             flexible = self.model.flexible.get(name)
             if flexible is not None and flexible.shapes is not None:
@@ -149,7 +160,7 @@ class _Sight:
         return np.stack([self.at[one][:, 0:3], self.at[other][:, 0:3]], axis=1)
 
     def _star(self, name: str) -> Iterator[Array]:
-        """From where a body is held to its ends, or to its centre of mass where it has no other."""
+        """Lines from the hinge of a body to its other ends, or without such to its mass centre."""
         held = self.held.get(name, name)
         ends = [f"{name}.{end}" for end in self.scene.bodies.ends(name) or ()]
         others = [end for end in ends if end != held]
@@ -162,7 +173,7 @@ class _Sight:
             yield np.stack([self.at[held][:, 0:3], pose[:, 0:3] + offset], axis=1)
 
     def _axis(self, name: str) -> Array:
-        """The axis of a beam, bent."""
+        """Deflected axis (n, m, 3) of a beam."""
         pose, body = self.at[name], self.model.flexible[name]
         eta = self.q[:, self.model.layout.modal[name].q_slice]
         none, still = np.zeros_like(eta), np.zeros((len(eta), 3))
@@ -173,17 +184,17 @@ class _Sight:
         return observe.deflected_axis(motion, np.linspace(0.0, motion.shapes.length, _FINE))
 
     def springs(self) -> Iterator[Array]:
-        """(n, 2, 3) lines of springs and bushings."""
+        """Lines (n, 2, 3) of springs and bushings."""
         for force in self.packed.system.forces:
             ends = self._observed([Probe(*end) for end in force.ends])
             yield np.moveaxis(ends[:, :, 0:3], 0, 1)
 
     def joints(self) -> Array:
-        """(k, n, 3)"""
+        """Positions (k, n, 3) of hinges on their outboard bodies."""
         return np.array([self.at[hinge.outboard][:, 0:3] for hinge in self.hinges])
 
     def ground(self) -> Array:
-        """(k, 3)"""
+        """Positions (k, 3) of hinges that constrain bodies to the ground."""
         slots = self.model.layout.hinges
         places = [
             hinge.position for hinge in self.hinges

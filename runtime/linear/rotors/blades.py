@@ -63,7 +63,7 @@ class Blades:
 
 @dataclass(frozen=True)
 class _Branch:
-    """Branch: indices of its `bodies` in the tree and of its perturbations; `form` identifies it.
+    """Branch with tree indices `bodies` and perturbation indices `coordinates`.
 
     Branches of equal `form` have the same hinges and free perturbations.
     """

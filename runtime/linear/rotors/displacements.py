@@ -124,7 +124,7 @@ def _stations(body: ModalBody) -> Array:
 
 
 def _sections(body: ModalBody, frame: Array, rates: Array) -> Array:
-    """Section motion (m, sections, 24) of a beam at modal rates (m, modes), on its straight axis.
+    """Section motion (m, sections, 24) of an undeformed beam at modal rates (m, modes).
 
     `frame` (m, 24) is the motion of the body frame.
     """
