@@ -160,7 +160,8 @@ def mechanism_at(
 
     Viscous dampers replace `dry` friction.
 
-    Raises NumericalFailure at a singular configuration.
+    Raises NumericalFailure where the independent speeds do not determine all others: dead centre,
+    singular configuration, open loop.
     """
     if model.freedom is None:
         return None

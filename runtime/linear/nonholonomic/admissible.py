@@ -121,7 +121,8 @@ def rolling_at(
     `own` are the indices of independent positions and speeds, by default a well-conditioned choice
     that prefers speeds at which `changing` (nu,) is zero.  Viscous dampers replace `dry` friction.
 
-    Raises NumericalFailure at a singular configuration.
+    Raises NumericalFailure where the independent speeds do not determine all others: dead centre,
+    singular configuration, open loop.
     """
     freedom = model.freedom
     assert freedom is not None

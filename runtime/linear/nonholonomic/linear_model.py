@@ -395,7 +395,7 @@ class NonholonomicModes(Modes):
 def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
     """Nonholonomic linear model about the motion through the state of `bare`.
 
-    Raises NumericalFailure at a singular configuration.
+    Raises NumericalFailure as `rolling_at`.
     """
     model, state, dry = bare.model, bare.state, bare.dry
     frames = frames_at(model, state)
