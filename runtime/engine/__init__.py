@@ -1,1 +1,1 @@
-"""Evaluations of a packed scene: accelerations, inverse dynamics, observations, tangents."""
+"""Evaluation of packed scenes: accelerations, inverse dynamics, observations, tangents."""

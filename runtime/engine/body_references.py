@@ -13,18 +13,18 @@ from mstmm.scene.validators.validation_messages import did_you_mean
 
 
 class BodyReferences(Collection[str]):
-    """Collection of the names of all bodies and ends of a scene: "rod1", "rod1.tip".
+    """Names of all bodies and ends of a scene: "rod1", "rod1.tip".
 
-    `scene` is the skeleton, in which flexible bodies are bodies with ends like all others.
+    `scene` is the skeleton, in which flexible bodies appear as ordinary bodies with ends.
     """
 
     def __init__(self, scene: SceneTables) -> None:
         self.scene, self.bodies = scene, scene.bodies
 
     def canonical(self, reference: str) -> str | None:
-        """Name of a reference in the scene, or None if there is no such body or end.
+        """Canonical name of a reference, or None if there is no such body or end.
 
-        Members of chains get their index; synonyms of other programs are resolved.
+        Chain members get their index; synonyms of other programs are resolved.
         """
         return self._known(reference) or self._known(self.scene.names.reference(reference))
 
@@ -37,7 +37,7 @@ class BodyReferences(Collection[str]):
         return self.bodies.name(index) + (f".{end_name}" if end_name else "")
 
     def place(self, reference: str) -> str:
-        """Canonical name of a reference, or the ground; SceneError for an unknown one."""
+        """Canonical name of a body, an end or the ground; raises SceneError if unknown."""
         canonical_name = self.canonical(reference)
         if canonical_name is not None:
             return canonical_name
@@ -46,7 +46,7 @@ class BodyReferences(Collection[str]):
         raise SceneError(self.unknown(reference))
 
     def unknown(self, reference: str) -> str:
-        """Message that there is no such body or end, with the nearest name."""
+        """Message for an unknown reference, with the nearest known name."""
         body = split_reference(reference)[0]
         if self.bodies.of_chain(body) and self.bodies.find(body) is None:
             return f'"{reference}": {self.bodies.missing(body)}'

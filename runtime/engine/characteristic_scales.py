@@ -1,4 +1,4 @@
-"""Characteristic scale of each coordinate, relative to which changes are small or large."""
+"""Characteristic scale of each coordinate: reference for small and large changes."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..flexible.modal_body import ModalBody
 from ..flexible.modal_scales import modal_sizes, radius_of_gyration
 from ..packing.coordinate_layout import Layout
 
-#: Distances in a scene that are rounding of zero: relative to the radii of gyration, and in m if
-#: all masses are points.
+#: Scene length below which distances are rounding errors: relative to the largest radius of
+#: gyration, and in m if all masses are points.
 _MIN_LENGTH_RATIO, _MIN_LENGTH_M = 1e-3, 1e-5
 
 
 class HasScales(Protocol):
-    """Compiled scene, as far as characteristic scales need it."""
+    """Part of a compiled scene that determines characteristic scales."""
 
     @property
     def scene(self) -> Scene: ...
@@ -33,7 +33,7 @@ class HasScales(Protocol):
 
 
 def speed_scales(model: HasScales) -> Array:
-    """Characteristic scales (nu,): 1 rad, a length of the scene, m, or that of a mode."""
+    """Characteristic scales (nu,) of the speeds: 1 rad, the scene length (m), or modal sizes."""
     layout, scales = model.layout, np.ones(model.nu)
     length = scene_length(model)
     for slots in layout.hinges.values():
@@ -47,7 +47,7 @@ def speed_scales(model: HasScales) -> Array:
 def scene_length(model: HasScales) -> float:
     """Largest distance within a body or between successive hinges, m.
 
-    It is 1 if all are zero, or rounding of zero compared with the radii of gyration.
+    It is 1 if all distances are zero or rounding errors relative to the radii of gyration.
     """
     scene = model.scene
     positions = [hinge.position for hinge in scene.hinge]

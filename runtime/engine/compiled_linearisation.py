@@ -1,4 +1,4 @@
-"""Linearisation of a scene at its states by fused code, together with accelerations."""
+"""Accelerations and linearisation of a scene at given states, by fused code."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from .fused_code import FusedCode
 from .live_inputs import LiveInputs
 from .looped_engine import LoopedEngine
 
-#: Time of a compilation, s, per squared number of speeds, and time that its code saves per state,
-#: constant and per squared number of speeds; measured.  Only their ratio matters; the values are
-#: fixed for reproducible choices.
+#: Measured compilation time (s) per squared number of speeds, and time saved per state (s):
+#: constant, and per squared number of speeds.  Only the ratio matters; fixed values make the choice
+#: reproducible.
 _SECONDS_PER_PAIR = 0.035
 _SECONDS_SAVED, _SECONDS_SAVED_PER_PAIR = 2e-5, 4e-7
 
 
 class CompiledState:
-    """Accelerations and linear model at one state; n of nu speeds are free.
+    """Accelerations and linear model at one state; n of the nu speeds are free.
 
-    `a` (nu,) accelerations; M, C, K (n, n) as in `linear.matrices`; G (n, n) of x' = G x + du; r_t
-    (n,) partial derivative of efforts with respect to time; all are views of `numbers`.
+    Accelerations `a` (nu,); M, C, K (n, n) as in `linear.matrices`; G (n, n) of x' = G x + du; r_t
+    (n,), partial derivative of efforts with respect to time; all are views of `numbers`.
     """
 
     __slots__ = ("_n", "_nu", "numbers")
@@ -63,9 +63,9 @@ class CompiledState:
 
 
 class LinearisationCode:
-    """Source of `CompiledState` for the states of one scene.  Safe to call from several threads.
+    """Linearisation of one scene by compiled code; thread-safe.
 
-    Its code is looked for at the first call, and compiled once enough states justify it.
+    The first call searches the cache for the code; it is compiled once enough states justify it.
     """
 
     def __init__(self, engine: LoopedEngine, fusion: FusedCode, free: Sequence[int]) -> None:
@@ -75,10 +75,9 @@ class LinearisationCode:
         self._looked, self._saved = False, 0.0
 
     def at(self, t: float, q: Array, u: Array) -> CompiledState | None:
-        """Evaluate one state, q (nq,) and u (nu,), contiguous.
+        """Evaluate one state; q (nq,) and u (nu,) must be contiguous.
 
-        None if there is no code or a guard fails: then use the looped engine, which names the
-        cause.
+        Returns None if there is no code or a guard fails; the looped engine then names the cause.
         """
         call = self.call()
         return None if call is None else call.at(t, q, u)
@@ -86,13 +85,14 @@ class LinearisationCode:
     def state_matrix(self, about: CompiledState, turning: bool) -> Array | None:
         """State matrix A (2 n, 2 n) of d/dt (x, x') = A (x, x').
 
-        x' = du or, with `turning`, G x + du.  None if M is not positive definite.
+        x' = du or, with `turning`, G x + du.  Returns None without code, or if M is not positive
+        definite.
         """
         call = self.call(0.0)
         return None if call is None else call.state_matrix(about, turning)
 
     def call(self, saved: float = 1.0) -> LinearisationCall | None:
-        """Call of this thread, None without code; `saved` is the saved work in states."""
+        """Call of this thread, or None without code; `saved` is the number of states saved."""
         if self._library is None and not self._expect(saved):
             return None
         try:
@@ -102,7 +102,7 @@ class LinearisationCode:
         return call_of_thread
 
     def _expect(self, saved: float) -> bool:
-        """Count the saved work and get the code; True if there is code."""
+        """Add to the saved work, and load or compile the code; True if there is code."""
         if not self._n:
             return False
         with self._lock:
@@ -123,7 +123,7 @@ class LinearisationCode:
 
 
 class LinearisationCall:
-    """C record of the code for one thread, with the memory that it reads."""
+    """C record of the linearisation code for one thread, with the memory that it reads."""
 
     def __init__(
         self, engine: LoopedEngine, library: FusedLibrary, numbers: Array, live: LiveInputs, n: int
@@ -172,7 +172,7 @@ class LinearisationCall:
         )
 
     def at(self, t: float, q: Array, u: Array) -> CompiledState | None:
-        """Evaluate one state, see `LinearisationCode.at`."""
+        """Evaluate one state; see `LinearisationCode.at`."""
         buffer, real = self._ffi.from_buffer, self._real
         numbers = np.empty(self._numbers)
         is_failed = self._lib.mstmm_linear_at(
@@ -184,9 +184,9 @@ class LinearisationCall:
     def with_slopes(
         self, t: float, q: Array, u: Array, efforts: Array | None = None
     ) -> tuple[CompiledState, Array] | None:
-        """Evaluate one state with the derivatives (n, 3 n + 1) of the accelerations.
+        """Evaluate one state, with the derivatives (n, 3 n + 1) of the accelerations.
 
-        Their columns are those of -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t.
+        The columns of the derivatives are those of -M^-1 K, -M^-1 C, M^-1 and -M^-1 r_t.
         """
         buffer, real, n = self._ffi.from_buffer, self._real, self._n
         numbers, derivatives = np.empty(self._numbers), np.empty((n, 3 * n + 1))
@@ -203,7 +203,7 @@ class LinearisationCall:
         return None if is_failed else (CompiledState(numbers, self._nu, n), derivatives)
 
     def state_matrix(self, about: CompiledState, turning: bool) -> Array | None:
-        """State matrix, see `LinearisationCode.state_matrix`."""
+        """State matrix; see `LinearisationCode.state_matrix`."""
         n, buffer, real = self._n, self._ffi.from_buffer, self._real
         matrix = np.empty((2 * n, 2 * n))
         numbers = buffer(real, about.numbers)

@@ -1,4 +1,4 @@
-"""Compiled scene: packed for the engines, the basis of runs, results and models."""
+"""Compiled scene: packed for the engines; basis of runs, results and models."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ CompileOptions = tuple[Callable[[PackedScene, Known], FusedCode] | None, float |
 
 
 class CompiledScene:
-    """Scene that is ready for evaluation.
+    """Scene compiled for evaluation.
 
     Attributes:
         scene: the given scene.
         known: elements that are not prebuilt, by (kind, name).
         looped: looped engine on the packed scene.
         fusion: fused code of the scene.
-        closed: its closed loops, assembled; None for a tree.
+        closed: assembled closed loops; None for a tree.
         sweep: "riccati", "refined" or "qr".
     """
 
@@ -75,7 +75,7 @@ class CompiledScene:
         self.fusion: FusedCode = fusing(self.packed, self.known) if fusing else NoFusedCode()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the scene and the options; compiled code is looked for again when unpickled."""
+        """Pickle the scene and its options; unpickling searches for compiled code again."""
         return _unpickle, (type(self), self.scene, self._asked, self.fusion.library is not None)
 
     @property
@@ -84,7 +84,7 @@ class CompiledScene:
 
     @cached_property
     def apart(self) -> LoopedEngine:
-        """Looped engine without merged bodies, for quantities of merged bodies or hinges."""
+        """Looped engine without merging, for quantities of merged bodies or hinges."""
         packed = without_merging(self.packed)
         if packed is self.packed:
             return self.looped
@@ -93,12 +93,12 @@ class CompiledScene:
 
     @property
     def simplifications(self) -> tuple[Simplification, ...]:
-        """Simplifications of the packed scene, which do not change its motion."""
+        """Simplifications of the packed scene; they do not change its motion."""
         return self.packed.simplified
 
     @property
     def packed(self) -> PackedScene:
-        """Packed scene: its numbers in internal frames."""
+        """Packed scene; its numbers refer to internal frames."""
         return self.looped.packed
 
     @property
@@ -143,7 +143,7 @@ class CompiledScene:
     def increments(self) -> tuple[tuple[str, str], ...]:
         """Name and unit of the tangent increment of every free speed.
 
-        They are those of the coordinate if its rate is the speed.
+        If a speed is the rate of a coordinate, they are those of the coordinate.
         """
         names_and_units = list[tuple[str, str]]()
         for speed in self.free_speeds:
@@ -165,7 +165,7 @@ class CompiledScene:
 
     @cached_property
     def slopes(self) -> LinearisationCode:
-        """Linearisation of the scene by its fused code."""
+        """Linearisation of the scene by fused code."""
         return LinearisationCode(self.looped, self.fusion, self.free_speeds)
 
     @property
@@ -184,8 +184,8 @@ class CompiledScene:
     def with_parameters(self, changes: Mapping[str, float]) -> Self:
         """Copy of this model with other parameter values.
 
-        Nothing is recompiled, unless the model is fused and a number that was exactly zero (or an
-        axis along a coordinate axis) changes; then other code is compiled or found in the cache.
+        Recompilation is needed only if the model is fused and a number that was exactly zero (or an
+        axis along a coordinate axis) changes; the new code is compiled or found in the cache.
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an invalid value.
         """
@@ -194,8 +194,8 @@ class CompiledScene:
     def with_inputs(self, inputs: Mapping[str, InputValue]) -> Self:
         """Copy of this model with other inputs, by name; nothing is recompiled.
 
-        An input is given as a number, as the name of a signal of the scene, as (times, values) with
-        linear interpolation (s; times increase), or as the keys of a [[signal]] that it follows:
+        An input is a number, the name of a signal of the scene, (times, values) with increasing
+        times (s) and linear interpolation, or the keys of a [[signal]] that it follows:
         {"times": ..., "values": ..., "interpolation": "cubic"}.
 
         Raises SceneError for an unknown name (the nearest one is suggested) or an invalid value.
@@ -206,9 +206,9 @@ class CompiledScene:
         return self._with(scene_with_inputs(self.scene, inputs))
 
     def renewed(self, packed: PackedScene) -> Self:
-        """Copy of this model with the packed scene under other inputs, without validation.
+        """Copy of this model for a packed scene with other inputs, without validation.
 
-        The packed scene must fit the existing compiled code.
+        The packed scene must match the existing compiled code.
         """
         attributes = {
             name: value for name, value in vars(self).items()
@@ -220,7 +220,7 @@ class CompiledScene:
         return copy
 
     def _with(self, scene: Scene) -> Self:
-        """Compile the same scene with other numbers, with the same options."""
+        """Compile the same scene with other numbers and the same options."""
         recompiled = type(self)(scene, self.known, *self._asked)
         recompiled.fusion.follow(self.fusion)
         return recompiled
@@ -232,7 +232,7 @@ def _unpickle(
     asked: CompileOptions,
     fused: bool,
 ) -> CompiledScene:
-    """Restore a pickled model, with its fused code if that is in the cache here."""
+    """Restore a pickled model, with its fused code if the local cache contains it."""
     known, definitions = kernel_store.load_known(kernel_store.required_types(scene))
     scene.check_types(definitions)
     model = kind(scene, known, *asked)

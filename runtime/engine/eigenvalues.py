@@ -17,24 +17,25 @@ from .looped_engine import LoopedEngine
 
 Complex = NDArray[np.complex128]
 
-#: For states with more components only the fastest motion is computed, by a Krylov method.
+#: Maximum number of state components for a dense solution; for larger states a Krylov method
+#: computes only the fastest motion.
 MAX_DENSE_STATES = 160
 
 
 def fastest_eigenvalue(
     engine: LoopedEngine, t: float, y: Array, memory: Array
 ) -> tuple[complex, Complex]:
-    """Eigenvalue, 1/s, and eigenvector (nq + nu,) of the fastest motion that does not only grow."""
+    """Eigenvalue (1/s) and eigenvector (nq + nu,) of the fastest motion without pure growth."""
     values, vectors = eigenvalues(engine, t, y, memory)
     k = int(np.abs(values).argmax())
     return complex(values[k]), vectors[:, k]
 
 
 def eigenvalues(engine: LoopedEngine, t: float, y: Array, memory: Array) -> tuple[Complex, Complex]:
-    """Eigenvalues (k,), 1/s, and eigenvectors (nq + nu, k) of the motions at a state.
+    """Eigenvalues (k,), 1/s, and eigenvectors (nq + nu, k) of the Jacobian at a state.
 
-    Eigenvalues of monotonic growth are replaced by 0, positive real parts of the others by 0.  For
-    large scenes only the fastest motion is computed.
+    Eigenvalues of monotonic growth, and positive real parts of the others, are set to 0.  For large
+    scenes only the fastest motion is computed.
     """
     n = len(y)
     sizes = np.maximum(1e-6, 1e-6 * np.abs(y))
@@ -69,7 +70,7 @@ def _right_hand_sides(engine: LoopedEngine, t: float, states: Array, memory: Arr
 def _fastest_by_krylov(
     engine: LoopedEngine, t: float, y: Array, memory: Array
 ) -> tuple[Complex, Complex]:
-    """Fastest motion only, from products of the Jacobian with vectors."""
+    """Eigenvalue and eigenvector of the fastest motion, from Jacobian-vector products."""
     from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
     n, rates_at_state = len(y), _right_hand_sides(engine, t, y[None], memory)[0]

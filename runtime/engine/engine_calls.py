@@ -1,4 +1,4 @@
-"""Calls of the looped engine with numpy arrays; messages of failures name the element."""
+"""Calls of the looped engine with NumPy arrays; failure messages name the element."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .failure_messages import failure_text
 
 @dataclass(frozen=True)
 class Probe:
-    """Point with axes: body in the topology (-1: ground), axes (9), offset (3), internal axes."""
+    """Point with axes on a body: topology index (-1: ground), axes (9) and offset (3), internal."""
 
     body: int
     axes: tuple[float, ...]
@@ -27,7 +27,7 @@ class Probe:
 
 @dataclass(frozen=True)
 class Observation:
-    """Observed quantities of a batch of n states, in inertial axes.
+    """Observed quantities of n states, in inertial axes.
 
     points: (n, probes, 24): position, velocity, acceleration, angular velocity, angular
     acceleration, rotation matrix (row by row).  loads: (n, bodies, 6) force and moment of each
@@ -50,7 +50,7 @@ OBSERVATION_PARTS = ("points", "loads", "efforts", "udot", "sums", "rows")
 
 
 class EngineCalls:
-    """Calls of the compiled engine on one packed scene.  Safe to call from several threads."""
+    """Calls of the compiled engine on one packed scene; thread-safe."""
 
     def __init__(self, packed: PackedScene) -> None:
         self.packed = packed
@@ -60,7 +60,7 @@ class EngineCalls:
         self.local = threading.local()
 
     def workspace(self) -> Any:
-        """This thread's workspace as `real *`."""
+        """Workspace of this thread as `real *`."""
         size = self.packed.workspace
         if getattr(self.local, "size", None) != size:
             self.local.array = np.zeros(size)
@@ -69,7 +69,7 @@ class EngineCalls:
         return self.local.pointer
 
     def workspace_array(self) -> Array:
-        """View of this thread's workspace, as its last call left it."""
+        """View of this thread's workspace after its last call."""
         self.workspace()
         return np.asarray(self.local.array)
 
@@ -78,7 +78,7 @@ class EngineCalls:
         return self.ffi.from_buffer("real[]", array)
 
     def start_memory(self) -> Array:
-        """Initial memory: no releases, no turns counted, held inputs at their initial values."""
+        """Initial memory: no releases, no turns counted, stored inputs at their initial values."""
         system = self.packed.system
         memory = np.zeros(max(1, system.n_memory))
         memory[system.held.first : system.n_memory] = system.held.start
@@ -96,7 +96,7 @@ class EngineCalls:
 
     @cached_property
     def pulled(self) -> tuple[Self, ...]:
-        """Calls as `weighed` with a gravity of 1 m/s^2 along each inertial axis."""
+        """Calls like `weighed`, with gravity of 1 m/s^2 along each inertial axis."""
         return tuple(self._pulled(tuple(row)) for row in np.eye(3).tolist())
 
     def _pulled(self, gravity: tuple[float, ...]) -> Self:
@@ -109,7 +109,7 @@ class EngineCalls:
         return type(self)(replace(self.packed, model=model))
 
     def probes(self, probes: Sequence[Probe]) -> Any:
-        """C array `mstmm_probe[]` of probes."""
+        """Probes as a C array `mstmm_probe[]`."""
         records = self.ffi.new("mstmm_probe[]", max(1, len(probes)))
         for record, probe in zip(records, probes, strict=False):
             record.body = probe.body
@@ -128,8 +128,8 @@ class EngineCalls:
     ) -> Observation:
         """Compute the arrays named in `parts` for n states.
 
-        A state that cannot be evaluated gives nan in its row; `failures` has a message for the
-        first of each kind.  Arrays that are not requested have no columns.
+        The row of a state that cannot be evaluated is nan; `failures` contains a message for the
+        first failure of each kind.  Arrays that are not requested have no columns.
         """
         n, part_indices = len(t), {name: i for i, name in enumerate(OBSERVATION_PARTS)}
         bodies, numbers = self.packed.topology.count, int(self.lib.MSTMM_PROBE_NUMBERS)
@@ -173,7 +173,7 @@ class EngineCalls:
         )
 
     def sums(self, t: float, q: Array, u: Array, memory: Array) -> tuple[Array, str]:
-        """Compute `sums` of one state (nq,), (nu,): nan, and the reason, if that fails."""
+        """Compute `Observation.sums` of one state; nan with a message if that fails, else ""."""
         sums_found = np.full(int(self.lib.MSTMM_SUM_NUMBERS), np.nan)
         observation_record, failure = (
             self.ffi.new("mstmm_observation *"),
@@ -187,25 +187,25 @@ class EngineCalls:
             return sums_found, self.failure_text(failure, t)
         return sums_found, ""
 
-    # --- words ----------------------------------------------------------------------------------
+    # --- messages -------------------------------------------------------------------------------
 
     def hinge_name(self, position: int) -> str:
-        """Name of the inboard hinge of the body at a place of the topology."""
+        """Name of the inboard hinge of the body at a topology index."""
         packed = self.packed
         return packed.scene.hinges.name(packed.topology.at(position)[1])
 
     def closing(self, position: int) -> str:
-        """Name for messages of the element that closes a loop with the frame at a place."""
+        """Label of the element that closes a loop with the frame at a topology index."""
         name, _, table = self.hinge_name(position).partition("/")
         return f'{table or "hinge"} "{name}"'
 
     def is_flexible(self, position: int) -> bool:
-        """True if the body at a place of the topology is a node of a flexible body."""
+        """True if the body at a topology index is a node of a flexible body."""
         expanded = self.packed.expanded
         return expanded is not None and expanded.is_node(self.body_name(position))
 
     def body_name(self, position: int) -> str:
-        """Name of the body at a place of the topology."""
+        """Name of the body at a topology index."""
         packed = self.packed
         return packed.scene.bodies.name(packed.topology.at(position)[0])
 
@@ -216,6 +216,6 @@ class EngineCalls:
 
 
 def _first_with_count(texts: list[str]) -> str:
-    """First of equal failures, with the number of the others."""
+    """First of several failures of one kind, with the number of further samples."""
     further_count = len(texts) - 1
     return texts[0] + (f" (and {further_count} more samples)" if further_count else "")

@@ -1,4 +1,4 @@
-"""Messages for failures of the engine: element, time, cause, remedy."""
+"""Messages for engine failures: element, time, cause, remedy."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..packing.packed_scene import PackedScene
 
 
 class ElementNames(Protocol):
-    """Engine that names the elements at a place of the topology."""
+    """Engine that names the elements at a topology index."""
 
     packed: PackedScene
 
@@ -25,7 +25,7 @@ class ElementNames(Protocol):
 
 
 def failure_text(engine: ElementNames, reason: int, element: int, code: int, t: float) -> str:
-    """Message for `element`, which failed for `reason` at t (s); `code` is that of its kernel."""
+    """Message for the failure of `element` at t (s); `code` is the failure code of its kernel."""
     make_text = _TEXT_BY_REASON.get(reason, _expression_text)
     return make_text(engine, element, f"at t = {t:.9g} s", code)
 

@@ -1,4 +1,4 @@
-"""Find the expression or quaternion that makes a state's motion or tangent not finite."""
+"""Search for the expression or quaternion that causes a non-finite motion or tangent."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from mstmm.scene import Constraint, Hinge, Scene
     from mstmm.scene.tables.loads import Spring
 
-#: Distance from the end of a curve, relative to 1 or to s, at which a motion has reached it.
+#: Distance from the end of a curve, relative to max(1, abs(s)), at which a motion has reached it.
 _END_DISTANCE = 1e-6
 
-#: End of the messages that name an expression.
+#: Remedy at the end of messages that name an expression.
 REMEDY = "keep it finite where the motion goes"
 
 
 def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array) -> str:
-    """Message that names an expression that is not finite at one state q (nq,), u (nu,), or "".
+    """Message that names a non-finite expression at a state q (nq,), u (nu,), or "".
 
-    Example: 'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'.  A quaternion of zero length
-    is named too; expressions that the engine does not evaluate are ignored.
+    Example: 'load "wind": force[1] = "sqrt(1-t)" is nan at t = 1.1 s'.  Also reports a quaternion
+    of zero length; ignores expressions that the engine does not evaluate.
     """
     model = engine.packed.model
     scene, layout = engine.packed.described, engine.packed.layout
@@ -55,7 +55,7 @@ def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array)
 
 
 def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array) -> str:
-    """Message that names an expression with a derivative that is not finite at a state, or "".
+    """Message that names an expression with a non-finite derivative at a state, or "".
 
     Example: 'hinge "pin": law.effort[0] = "sqrt(q)" has no finite slope along q at t = 0 s'.  Only
     derivatives that implicit methods need are tested.
@@ -75,7 +75,7 @@ def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array)
 
 
 def describe_curve_end(engine: EngineCalls, t: float, q: Array, u: Array, ahead: float) -> str:
-    """Message that names a curve that ends next to a state or within `ahead` (s) of it, or "".
+    """Message that names a curve that ends at a state or within `ahead` (s) of it, or "".
 
     Example: 'constraint "wire": curve[1] = "sqrt(1-s)" ends at s = 1, ...'.
     """
@@ -103,7 +103,7 @@ def _curve_value(entry: Expression, s: float) -> float:
 def _curve_end(
     value: Callable[[float], float], s: float, rate: float, ahead: float
 ) -> float | None:
-    """Last s next to `s`, or within `ahead` seconds at a rate, at which a value is finite."""
+    """Last s with a finite value if it is close to `s` or reached within `ahead` (s), else None."""
     if not math.isfinite(value(s)):
         return None
     rate = rate if math.isfinite(rate) else 0.0
@@ -138,7 +138,7 @@ def _nonfinite_text(where: str, expression: Expression, number: float, t: float)
     return f"{equation_text}; {REMEDY}"
 
 
-# --- the expressions of a scene -------------------------------------------------------------------
+# --- expressions of a scene -----------------------------------------------------------------------
 
 
 def _drive_expressions(scene: Scene) -> Iterator[tuple[str, Expression]]:
@@ -149,7 +149,7 @@ def _drive_expressions(scene: Scene) -> Iterator[tuple[str, Expression]]:
 
 
 def _effort_expressions(scene: Scene) -> Iterator[tuple[str, Expression, Hinge | None]]:
-    """Location, expression and hinge of every variable effort and load; without springs."""
+    """Location, expression and hinge of every variable effort and load, except springs."""
     for hinge in scene.hinge:
         yield from _hinge_efforts(f'hinge "{hinge.name}"', hinge)
     for first, chain in zip(scene.hinges.starts, scene.chain, strict=False):
@@ -177,7 +177,7 @@ def _expressions_with_values(
 ) -> Iterator[tuple[str, Expression, Callable[[Name], float]]]:
     """Variable efforts, loads, couplings and curves that the engine evaluates.
 
-    Yields location, expression and the function that gives the values of its names at a state.
+    Yields location, expression and a function from the names in it to their values at a state.
     """
     model, scene = engine.packed.model, engine.packed.described
     expression_values = _ExpressionValues(engine, t, q, u)
@@ -207,7 +207,7 @@ class _ExpressionValues:
         self.engine, self.t, self.q, self.u = engine, t, q, u
 
     def of(self, name: Name, own: Hinge | None) -> float:
-        """Value of t, an input, q or u of a hinge, or a parameter of the hinge `own`."""
+        """Value of t, an input, q, u, s or s_rate, or a parameter of the hinge `own`."""
         if name.text == "t":
             return self.t
         inputs = self.engine.packed.channels
@@ -223,7 +223,7 @@ class _ExpressionValues:
         return float(state_vector[first + index])
 
     def of_coupling(self, name: Name) -> float:
-        """Coordinate or speed to which a name in a coupling refers."""
+        """Value of the coordinate or speed to which a name in a coupling refers."""
         scene = self.engine.packed.described
         number, quantity, entry = resolve_coordinate(scene, name)
         slots = self.engine.packed.layout.hinges[scene.hinges.name(number)]
@@ -241,7 +241,7 @@ class _ExpressionValues:
         return float(self.u[layout.u_names.index(name)])
 
     def of_spring(self, name: Name, own: Spring) -> float:
-        """Value of a name in a spring's law, where q and u are its length and its rate."""
+        """Value of a name in a spring law, in which q and u are the length and its rate."""
         if name.text not in ("q", "u"):
             return self.of(name, None)
         length, rate = self._length(own)

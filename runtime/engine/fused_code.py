@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 
 class FusedCode(Protocol):
-    """Fused libraries of a scene, None for those not available.
+    """Fused libraries of a scene; None for those not available.
 
     `library` is for one state, `lanes` for several states in SIMD lanes, `implicit` for residuals
     and tangents of implicit methods, `inverse` for inverse dynamics and the mass matrix.
 
     `numbers` is the parameter vector p that they read, `inputs` the positions of inputs in it;
-    `note` says where the library came from, `obstacle` why there can be none.  `ready(n)` returns a
-    library if it exists or if n evaluations justify a compiler run; `find()` never compiles;
-    `build()` raises EnvironmentFailure if no library is possible.  `follow(other)` adopts the
-    libraries of the same scene with other numbers; `under(system)` is the code for a system with
-    other inputs.  `symbolic` is a linear model as formulas.
+    `note` gives the origin of the library, `obstacle` the reason that none is possible.  `ready(n)`
+    returns a library if it exists or if n evaluations justify a compiler run; `find()` never
+    compiles; `build()` raises EnvironmentFailure if no library is possible.  `follow(other)` adopts
+    the libraries of the same scene with other numbers; `under(system)` is the code for a system
+    with other inputs.  `symbolic` is a linear model as formulas.
     """
 
     numbers: Array

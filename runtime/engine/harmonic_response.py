@@ -1,9 +1,9 @@
 """Harmonic response of a packed scene, by the looped engine in O(bodies).
 
-Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent of the residual in complex numbers
-(derive/codegen/complex_sweep.py).  The contributions of the bodies are computed once, and every s
-is one elimination.  Hysteretic damping adds i (K' - K), with K' of a scene whose stiffness is
-larger by the loss factors.
+Z(s) x = r with Z(s) = s^2 M + s C + K, the complex tangent of the residual
+(derive/codegen/complex_sweep.py).  The contributions of the bodies are computed once; every s
+requires one elimination.  Hysteretic damping adds i (K' - K), where K' belongs to a scene with its
+stiffness increased by the loss factors.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ Complex = NDArray[np.complex128]
 
 
 class DynamicStiffnessBodies(NamedTuple):
-    """Flexible bodies with dynamic stiffness, at these places of the tree.
+    """Flexible bodies with dynamic stiffness, by their indices in the tree.
 
-    `stiffness` gives at s (k,) for each of them in turn the matrix (k, 6 + n, 6 + n) of loads on
-    the frame, for three rotations and three displacements, and on the n shapes.
+    `stiffness` returns at s (k,) one matrix (k, 6 + n, 6 + n) for each body: loads on the frame, in
+    three rotations and three displacements, and on the n shapes.
     """
 
     places: tuple[int, ...]
@@ -37,11 +37,11 @@ class DynamicStiffnessBodies(NamedTuple):
 
 
 class HarmonicResponse:
-    """Dynamic stiffness Z(s) of one scene about one state; each thread needs its own.
+    """Dynamic stiffness Z(s) of one scene about one state; not thread-safe.
 
-    `lanes` is the number of s evaluated together, 2 or 4; 0 for the most that the processor
-    supports.  `stiffer` is the scene with elastic stiffness increased by the loss factors; `exact`
-    are bodies with dynamic stiffness.
+    `lanes` is the number of s evaluated together, 2 or 4; 0 for the maximum of the processor.
+    `stiffer` is the scene with elastic stiffness increased by the loss factors; `exact` are bodies
+    with dynamic stiffness.
     """
 
     def __init__(
@@ -81,7 +81,7 @@ class HarmonicResponse:
     def amplitudes(self, s: Complex, columns: Array) -> tuple[Complex, Array, NDArray[np.int32]]:
         """Amplitudes x (k, n, nu) at every s (k,), 1/s, for n right-hand sides (n, nu).
 
-        Also returns the growth of inertia in the elimination (k,), and the body where it occurred
+        Also returns the growth of inertia in the elimination (k,) and the body where it occurs
         (k,).  An elimination loses as many digits as inertia grows; if it is singular, the growth
         is infinite and x is zero.
         """
@@ -89,7 +89,7 @@ class HarmonicResponse:
         x = np.zeros((len(points), len(rows), self.engine.nu), dtype=np.complex128)
         growth, growth_bodies = np.zeros(len(points)), np.zeros(len(points), dtype=np.int32)
         pointer = self.engine.pointer
-        exact_stiffness = self._stiffness(points)  # while it is read
+        exact_stiffness = self._stiffness(points)  # keeps the memory alive during the call
         self.engine.lib.mstmm_response_many(
             self._record, len(points), pointer(points.view(np.float64)), len(rows), pointer(rows),
             pointer(x.view(np.float64)), pointer(growth),
@@ -109,13 +109,13 @@ class HarmonicResponse:
         return stiffness_rows
 
     def undamped(self) -> None:
-        """Remove the terms in the first power of s from now on."""
+        """Omit the terms linear in s from now on."""
         self._kept["brought"][: len(self.tangent.numbers)] = 0.0
 
     def count_negative(self, squares: Array) -> Integers:
-        """Number of negative pivots at every s^2 (k,) < 0 of a symmetric Z; -1 for a zero pivot.
+        """Number of negative pivots of a symmetric Z at every s^2 (k,) < 0; -1 for a zero pivot.
 
-        It is the number of negative eigenvalues (see `TangentMatrix.count_negative`).
+        It equals the number of negative eigenvalues (see `TangentMatrix.count_negative`).
         """
         sizes = self._sizes
         pivots = np.zeros((len(squares), int(np.square(sizes).sum())))

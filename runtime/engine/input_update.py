@@ -1,4 +1,4 @@
-"""Packed scenes with other inputs: only the records of inputs are written again."""
+"""Packed scenes with other inputs; only the input records are rewritten."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def with_input_values(packed: PackedScene, values: Mapping[str, float | str]) ->
 
 
 def with_held_inputs(packed: PackedScene, names: Sequence[str], t: float) -> PackedScene:
-    """Packed scene with the named inputs in memory, so that a run's caller can set them.
+    """Packed scene with the named inputs in memory, where the caller of a run can set them.
 
     They are appended to the memory with their values at t (s) and may be set between steps.
     """
@@ -48,9 +48,9 @@ def with_held_inputs(packed: PackedScene, names: Sequence[str], t: float) -> Pac
 
 
 def with_input_pieces(packed: PackedScene, named: Mapping[str, PiecewisePolynomial]) -> PackedScene:
-    """Packed scene with given functions of time for some inputs that no drive uses.
+    """Packed scene with functions of time for some inputs that no drive uses.
 
-    The scene itself is not changed.
+    The scene tables remain unchanged.
     """
     channels = packed.channels | dict(named)
     system = replace(

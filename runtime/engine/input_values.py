@@ -1,4 +1,4 @@
-"""Input values set by the caller: numbers, or functions of time."""
+"""Input values set by the caller: numbers or functions of time."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _EXPECTED_INPUT = "a number, the name of a signal, (times, values) or the keys o
 def apply_without_recompile(
     scene: Scene, inputs: Mapping[str, InputValue]
 ) -> dict[str, float | str] | None:
-    """Check given inputs that change only values: numbers or names of signals, without drives.
+    """Validate inputs that change only values: numbers or signal names, without drives.
 
     Returns them by name, or None if the scene must be validated again.  Raises SceneError for
     unknown inputs and invalid values.
@@ -50,7 +50,7 @@ def apply_without_recompile(
 
 
 def scene_with_inputs(scene: Scene, inputs: Mapping[str, InputValue]) -> Scene:
-    """Scene with other inputs, validated again; inputs over time become signals of it.
+    """Scene with other inputs, validated again; inputs over time become signals.
 
     Raises SceneError for unknown inputs and invalid values.
     """
@@ -102,7 +102,7 @@ def _input_label(name: str) -> str:
 
 
 def _signal_table(name: str, given: Any) -> dict[str, Any] | None:
-    """Signal table of an input over time; None for a number or a name."""
+    """Signal table of an input over time; None for a number or a signal name."""
     if isinstance(given, Mapping):
         return {key: _plain_value(name, key, value) for key, value in given.items()}
     if not _is_over_time(given):
@@ -129,9 +129,9 @@ def _plain_value(name: str, key: str, value: Any) -> Any:
 
 
 def _unused_signal_name(scene: Scene, name: str) -> str:
-    """Name of the signal that an input follows from now on.
+    """Name for the new signal of an input.
 
-    A signal of an earlier call that only this input uses is replaced.
+    It may be that of a signal of an earlier call that only this input uses, which is replaced.
     """
     used_names = {*scene.channels, *scene.constants}
     own_signals = {signal for signal, user_name in input_references(scene) if user_name == name}

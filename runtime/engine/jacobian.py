@@ -1,10 +1,10 @@
-"""Jacobian of the equations of motion, for implicit integrators: exact, else by differences.
+"""Jacobian of the equations of motion for implicit integrators: exact or by differences.
 
 The exact Jacobian is the derivative of the fused kernel (`mstmm.ir.differentiation`), run by the
-interpreter.  Central differences are used for scenes without that kernel (releases change its form)
-or with so many bodies that its generation takes longer than it saves, and for states at which a
-derivative does not exist.  Their increments never grow: larger ones give no information along a
-coordinate that the equations do not contain.
+interpreter.  Central differences are used for scenes without that kernel (releases change its
+form), for scenes with so many bodies that its generation takes longer than it saves, and for states
+at which a derivative does not exist.  Increments never grow: larger ones give no information along
+a coordinate that the equations do not contain.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Rates = Callable[[float, Array], Array]
 #: Function from a time (s) and the memory of a run to the numbers p of compiled code.
 Numbers = Callable[[float, Array], Array]
 
-#: Scenes with more bodies use differences: generating the tangent kernel would take many seconds.
+#: Maximum number of bodies for the exact Jacobian: generating larger kernels takes many seconds.
 MAX_BODIES = 64
 
 #: Increment of a difference, in rad, m and their rates, or relative to a larger number.
@@ -38,22 +38,22 @@ _DIFFERENCE_INCREMENT = 1e-6
 
 
 class OdeJacobian:
-    """Jacobian d(dy/dt)/dy for the state y = (q, u), with `with_work` followed by the work.
+    """Jacobian d(dy/dt)/dy of the state y = (q, u), extended by the work if `with_work`.
 
     `rates(t, y)` are the equations, nan where they cannot be evaluated; `memory` (m,) is read at
-    every call.  `exact` says which kind it is.
+    every call.
     """
 
     def __init__(self, model: CompiledScene, with_work: bool, memory: Array, rates: Rates) -> None:
         self._rates, self._memory, self._nq = rates, memory, model.nq
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
         self._tape, self._numbers = _tangent_kernel(model, self._outputs)
-        #: Held inputs and states of controllers follow what the kernel reads.
+        #: Length of the memory that the kernel reads; stored inputs and controller states follow.
         self._n_memory = model.packed.system.held.first
 
     @property
     def exact(self) -> bool:
-        """True if the equations are differentiated, False for differences."""
+        """True if the equations are differentiated exactly, False for differences."""
         return self._tape is not None
 
     def __call__(self, t: float, y: Array) -> Array:
@@ -95,7 +95,7 @@ class OdeJacobian:
 
 
 def _tangent_kernel(model: CompiledScene, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
-    """Tangent kernel of the equations with respect to q and u, or None, and its numbers p."""
+    """Tangent kernel with respect to q and u, or None, and the function for its numbers p."""
     packed, added_elements = model.packed, model.known or {}
     if packed.releases or packed.system.count > MAX_BODIES:
         return None, _no_numbers

@@ -1,4 +1,4 @@
-"""Inputs among the numbers p of compiled code: their positions, and their values over time."""
+"""Inputs among the numbers p of compiled code: positions, and values over time."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ _VALUE_INDEX = 1
 
 
 class LiveInputs:
-    """Inputs of a system in the numbers p that its compiled code reads.
+    """Inputs of a system among the numbers p that its compiled code reads.
 
-    `read` are pairs (index among the numbers of all inputs, index in p).  `places` (inputs, COUNT)
-    are the indices in p, -1 for numbers that are not read; `varies` says whether any of them
-    changes with time or is `held` in memory.
+    `read` contains pairs (index among the numbers of all inputs, index in p).  `places` (inputs,
+    `NUMBERS_PER_PIECE`) are the indices in p, -1 for numbers that are not read.
     """
 
     def __init__(self, system: System, read: Places) -> None:
@@ -45,11 +44,11 @@ class LiveInputs:
 
     @property
     def varies(self) -> bool:
-        """True if p changes with time."""
+        """True if any number in p changes with time or is stored in memory."""
         return bool(self._moving or self._held)
 
     def now(self, p: Array, t: float, memory: Array) -> Array:
-        """Numbers p (np,) at time t (s) of a run, with held inputs from its `memory`."""
+        """Numbers p (np,) at time t (s) of a run, with stored inputs from its `memory`."""
         numbers = self.at(p, np.array([t])).reshape(-1).copy()
         for i, place in self._held:
             is_read = self.places[i] >= 0
@@ -58,7 +57,7 @@ class LiveInputs:
         return numbers
 
     def at(self, p: Array, t: Array) -> Array:
-        """Numbers p (n, np) at times t (n,), s; p itself, (np,), if it is constant."""
+        """Numbers p (n, np) at times t (n,), s; the given p (np,) if it is constant."""
         if not self._moving:
             return p
         rows = np.repeat(p[None], len(t), axis=0)

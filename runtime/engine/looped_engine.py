@@ -16,12 +16,12 @@ from .failure_source import find_nonfinite_expression
 
 
 class LoopedEngine(EngineCalls):
-    """Looped engine on one packed scene; its errors name the causing expression or element."""
+    """Looped engine on one packed scene; errors name the causing expression or element."""
 
     def accelerations(
         self, t: ArrayLike, q: Array, u: Array, memory: Array, efforts: Array | None = None
     ) -> tuple[Array, Array]:
-        """Compute qdot, udot of n states: q (n, nq), u (n, nu), memory (n, m), efforts (n, nu)."""
+        """Compute qdot, udot of n states; q (n, nq), u (n, nu), memory (n, m), efforts (n, nu)."""
         n = len(q)
         times = np.empty(n)
         times[:] = t
@@ -43,7 +43,7 @@ class LoopedEngine(EngineCalls):
         return qdot, udot
 
     def failed(self, failure: Any, t: float, q: Array, u: Array) -> NumericalFailure:
-        """Error for a state that cannot be evaluated; it names an expression, else the element."""
+        """Error for a state that cannot be evaluated; names the expression or the element."""
         cause = find_nonfinite_expression(self, t, q, u)
         if cause:
             return NumericalFailure(cause)
@@ -53,12 +53,12 @@ class LoopedEngine(EngineCalls):
         return NumericalFailure(text)
 
     def not_finite(self, what: str, t: float, q: Array, u: Array) -> NumericalFailure:
-        """Error for a state at which `what` is not finite; it names the causing expression."""
+        """Error for a state with a non-finite quantity `what`; names the causing expression."""
         cause = find_nonfinite_expression(self, t, q, u)
         return NumericalFailure(f"{what} is not finite at t = {t:.9g} s{cause and ': '}{cause}")
 
     def inverse_dynamics(self, t: float, q: Array, u: Array, udot: Array, memory: Array) -> Array:
-        """Efforts (nu,) that `udot` needs at one state in addition to those of laws."""
+        """Efforts (nu,) that `udot` requires at one state, in addition to those of laws."""
         efforts = np.empty(self.nu)
         failure = self.ffi.new("mstmm_failure *")
         code = self.lib.mstmm_inverse_dynamics(
@@ -73,7 +73,7 @@ class LoopedEngine(EngineCalls):
         return efforts
 
     def required_by_inertia(self, q: Array, accelerations: Array) -> Array:
-        """Product of M(q) and n rows of accelerations (n, nu), all speeds free; O(bodies) each."""
+        """Product of M(q) and n accelerations (n, nu), all speeds free; O(bodies) each."""
         engine, zero_speeds = self.inertia_alone, np.zeros(self.nu)
         memory = engine.start_memory()
         base_efforts = engine.inverse_dynamics(0.0, q, zero_speeds, zero_speeds, memory)
@@ -86,8 +86,8 @@ class LoopedEngine(EngineCalls):
     def kinetic_energies(self, q: Array, speeds: Array) -> Array:
         """Kinetic energies (n, bodies), J, at q (nq,) and n speeds (n, nu), O(bodies) each.
 
-        By place in the topology; rotors count with the outboard body of their hinge, drives are
-        ignored.
+        Bodies are in the order of the topology; rotors count with the outboard body of their hinge,
+        drives are ignored.
         """
         engine, n, zero_speeds = self.inertia_alone, len(speeds), np.zeros(self.nu)
         energies = np.empty((n, self.packed.topology.count))
@@ -106,7 +106,7 @@ class LoopedEngine(EngineCalls):
         return energies
 
     def mass_matrix(self, q: Array) -> Array:
-        """Symmetric mass matrix (nu, nu) of one state, with driven coordinates as if free."""
+        """Symmetric mass matrix (nu, nu) of one state; driven coordinates count as free."""
         if self.packed.layout.modal:
             matrix = self.required_by_inertia(q, np.eye(self.nu)).T
             return np.asarray((matrix + matrix.T) / 2)
@@ -128,14 +128,15 @@ class LoopedEngine(EngineCalls):
     def solve(self, q: Array, columns: Array, memory: Array | None = None) -> Array:
         """Product of M(q)^-1 and n columns of efforts (n, nu) at one state q (nq,).
 
-        It is zero on prescribed speeds.  The mass matrix is factored once, and each column is
-        O(bodies); with sweeps "qr" and "refined" and with closed loops no factor is kept, and each
-        column is a sweep at rest with its efforts.  Without `memory` no hinge is released.
+        It is zero on prescribed speeds.  The mass matrix is factored once, and each column costs
+        O(bodies); with sweeps "qr" and "refined" and with closed loops no factor is stored, and
+        each column requires a sweep at rest with its efforts.  Without `memory` no hinge is
+        released.
         """
         engine = self.inertia_alone
         memory = engine.start_memory() if memory is None else memory
         if self.packed.qr or self.packed.refined or self.packed.system.closes:
-            # Couplings that depend on time move without efforts: the last column subtracts this.
+            # Time-dependent couplings cause motion without efforts: subtract it by a zero column.
             columns = np.vstack([columns, np.zeros(self.nu)])
             n, zero_speeds = len(columns), np.zeros(columns.shape)
             state_rows = np.tile(q, (n, 1)), zero_speeds, np.tile(memory, (n, 1))
@@ -155,7 +156,7 @@ class LoopedEngine(EngineCalls):
         return solutions
 
     def rates(self, t: float, q: Array, u: Array, memory: Array) -> Array:
-        """Rates qdot (nq,) of one state, by kinematics only: no inertia need be positive."""
+        """Rates qdot (nq,) of one state by kinematics, without requiring positive inertia."""
         self.inverse_dynamics(t, q, u, np.zeros(self.nu), memory)
         model = self.packed.model
         first = int(model.scratch) + self.nq + self.nu + int(model.n_values)

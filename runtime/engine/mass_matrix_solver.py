@@ -1,4 +1,4 @@
-"""Solutions with the mass matrix, M^-1 times columns, by the looped engine or compiled code."""
+"""Solver for the mass matrix, M^-1 times columns, by the looped engine or compiled code."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from .looped_engine import LoopedEngine
 if TYPE_CHECKING:
     from ..kernels.derivative_library import DerivativeLibrary
 
-#: Time of a compilation, s, constant and per squared number of speeds, and time that its code saves
-#: per state and per number of the right-hand sides; measured.  Only ratios matter; the values are
-#: fixed for reproducible choices.
+#: Measured compilation time (s), constant and per squared number of speeds, and time saved (s) per
+#: state and per number in the right-hand sides.  Only ratios matter; fixed values make the choice
+#: reproducible.
 _COMPILE_SECONDS, _COMPILE_SECONDS_PER_PAIR = 0.2, 0.005
 _SAVED_PER_STATE, _SAVED_PER_NUMBER = 1e-5, 3e-8
 
 
 class MassMatrixSolver:
-    """Solver with the mass matrix of one scene.  Safe to call from several threads."""
+    """Solver for the mass matrix of one scene; thread-safe."""
 
     def __init__(self, engine: LoopedEngine, fusion: FusedCode) -> None:
         self._engine, self._fusion = engine, fusion
@@ -35,9 +35,9 @@ class MassMatrixSolver:
         self._obstacle = ""
 
     def solve(self, q: Array, columns: Array) -> Array:
-        """Solutions (n, k, nu) for columns (n, k, nu) at n states q (n, nq).
+        """Solve for columns (n, k, nu) at n states q (n, nq); returns (n, k, nu).
 
-        Raises NumericalFailure that names a motion without inertia.
+        Raises NumericalFailure, which names a motion without inertia.
         """
         if not columns.size:
             return columns.copy()
@@ -53,7 +53,7 @@ class MassMatrixSolver:
         return np.array(rows).reshape(columns.shape)
 
     def build(self) -> None:
-        """Compile the code of the scene now.  EnvironmentFailure if that fails."""
+        """Compile the code of the scene; raises EnvironmentFailure if that fails."""
         with self._lock:
             self._library = self._fusion.solution(build=True)
 
@@ -63,7 +63,7 @@ class MassMatrixSolver:
         return self._library is not None
 
     def _expect(self, states: int, numbers: int) -> DerivativeLibrary | None:
-        """Compiled code if it exists or would have saved the time of its compilation."""
+        """Compiled code if it exists or the saved time exceeds that of its compilation."""
         with self._lock:
             self._saved += states * _SAVED_PER_STATE + numbers * _SAVED_PER_NUMBER
             is_worthwhile = (
@@ -78,7 +78,7 @@ class MassMatrixSolver:
             return self._library
 
     def _fused(self, library: DerivativeLibrary, q: Array, columns: Array) -> Array | None:
-        """Solutions by compiled code; None if a guard fails: the looped engine names the cause."""
+        """Solutions by compiled code; None if a guard fails (the looped engine names the cause)."""
         numbers, nu = self._fusion.numbers, self._engine.nu
         zero_speeds = np.zeros((1, nu))
         memory = self._engine.start_memory()[None]

@@ -1,4 +1,4 @@
-"""Columns of an observation by the names of quantities, with units and labels."""
+"""Columns of an observation by quantity name, with units and labels."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class QuantityKind:
-    """Vector quantity of a body or hinge: unit, long name, labels and short names of columns."""
+    """Vector quantity of a body or hinge: unit, long name, column labels and short names."""
 
     unit: str
     long_name: str
@@ -33,7 +33,7 @@ BODY_QUANTITIES = {
     ),
 }
 
-#: Loads of the inboard on the outboard side of a hinge.
+#: Loads that the inboard side of a hinge exerts on the outboard side.
 HINGE_QUANTITIES = {
     "force": QuantityKind(
         "N", "force of the inboard on the outboard side", XYZ, ("fx", "fy", "fz")
@@ -62,14 +62,14 @@ POINT_COLUMNS = {
 
 
 def effort_names(speeds: Sequence[str]) -> list[str]:
-    """Names of the efforts along the speeds of a hinge: effort, or effort_wx and so on."""
+    """Names of the efforts of a hinge: effort for one speed, else effort_wx and so on."""
     if len(speeds) == 1:
         return ["effort"]
     return [f"effort_{name.removesuffix('_rate')}" for name in speeds]
 
 
 def acceleration_name(speed: str) -> str:
-    """Name of a speed's derivative: angle_rate -> angle_acceleration, vx -> vx_dot."""
+    """Name of the derivative of a speed: angle_rate -> angle_acceleration, vx -> vx_dot."""
     stem = speed.removesuffix("_rate")
     return f"{stem}_acceleration" if stem != speed else f"{speed}_dot"
 

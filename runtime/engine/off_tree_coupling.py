@@ -1,13 +1,12 @@
-"""Unknowns of loads and constraints that couple distant bodies, and which of them are independent.
+"""Unknowns of loads and constraints that couple distant bodies, in independent groups.
 
 The elimination of a tangent along the tree does not contain them.  Unknowns are changes of loads
-and efforts, then accelerations and multipliers of closing hinges.  Those of one `group` move the
-same part of the scene: a branch on the ground, or one hinge that closes a loop.  If no load and no
-row depends on two groups at once, the tree is solved for one unknown of each in the same pass.  The
-number of passes then does not grow with the number of independent loops, and the remaining matrix
-is banded (E. Cuthill, J. McKee, Proc. 24th ACM National Conference (1969) 157-172; A. R. Curtis,
-M. J. D. Powell, J. K. Reid, J. Inst. Math. Appl. 13 (1974) 117-119).  With couplings there is one
-group.
+and efforts, then accelerations and multipliers of closing hinges.  The unknowns of one group move
+the same part of the scene: a branch on the ground, or one hinge that closes a loop.  If no load and
+no row depends on two groups, one pass solves the tree for one unknown of each group.  The number of
+passes then does not grow with the number of independent loops, and the remaining matrix is banded
+(E. Cuthill, J. McKee, Proc. 24th ACM National Conference (1969) 157-172; A. R. Curtis, M. J. D.
+Powell, J. K. Reid, J. Inst. Math. Appl. 13 (1974) 117-119).  With couplings there is one group.
 """
 
 from __future__ import annotations
@@ -29,13 +28,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class OffTreeCoupling:
-    """Unknowns outside the tree, their groups and passes.
+    """Unknowns outside the tree, with their groups and passes.
 
-    The unknowns are 6 of each of `bodies`, then `efforts` (index in the workspace, speed) and
-    `rows` (frame, direction, speed, row).  By group: the `members`, the `readers` (unknowns that
-    depend on the group), and the speeds that are `moved`; `passes` are the unknowns solved
-    together.  `ranks` (count,) are the positions of the unknowns in the matrix, which has `below`
-    and `above` diagonals below and above the main one.
+    The unknowns are 6 for each of `bodies`, then `efforts` (index in the workspace, speed) and
+    `rows` (frame, direction, speed, row).  For each group: `members`, `readers` (unknowns that
+    depend on the group), and `moved` (speeds).  `passes` are the unknowns solved together.  `ranks`
+    (count,) are the positions of the unknowns in the matrix, which has `below` and `above`
+    diagonals below and above the main one.
     """
 
     bodies: Sequence[int]
@@ -56,11 +55,11 @@ class OffTreeCoupling:
 
     @property
     def width(self) -> int:
-        """Numbers in a row of the factored matrix, including the fill by row exchanges."""
+        """Row length of the factored band matrix, including fill-in by row exchanges."""
         return min(self.count, 2 * self.below + self.above + 1)
 
     def written(self, engine: LoopedEngine) -> list[Any]:
-        """C record of the unknowns, followed by the memory that it refers to."""
+        """C record of the unknowns, followed by the memory to which it points."""
         ffi, blocks = engine.ffi, engine.packed.written.blocks
         record = ffi.new("mstmm_couplings *")
         kept_objects = [record]
@@ -136,7 +135,7 @@ def off_tree_coupling(engine: LoopedEngine) -> OffTreeCoupling:
 
 
 def single_group(bodies: Sequence[int], efforts: Any, rows: Any, nu: int) -> OffTreeCoupling:
-    """Put all unknowns in one group: each has its own pass, and the matrix is full."""
+    """Put all unknowns in one group, with one pass for each and a full matrix."""
     count = 6 * len(bodies) + len(efforts) + len(rows)
     all_unknowns, last_index = [range(count)], max(count - 1, 0)
     return OffTreeCoupling(
@@ -159,7 +158,7 @@ def _independent_groups(
     feeling: Sequence[set[int]],
     speeds: dict[int, list[int]],
 ) -> OffTreeCoupling:
-    """Find groups, passes and positions of unknowns.
+    """Find groups, passes and matrix positions of unknowns.
 
     `moving` is the group that each unknown moves, `feeling` the groups on which it depends.
     """
@@ -188,7 +187,7 @@ def _independent_groups(
 
 
 def _order_groups(names: list[int], together: set[frozenset[int]]) -> list[int]:
-    """Order groups so that those on which the same unknown depends are near each other."""
+    """Order groups to reduce the bandwidth: those that share a dependent unknown are adjacent."""
     neighbours = {name: {name} for name in names}
     for felt_groups in together:
         for name in felt_groups & neighbours.keys():
@@ -204,7 +203,7 @@ def _order_groups(names: list[int], together: set[frozenset[int]]) -> list[int]:
 
 
 def _breadth_first(start: int, near: Mapping[int, set[int]]) -> list[int]:
-    """Groups connected with one, the nearest first, among these those with few neighbours."""
+    """Groups connected with `start` in breadth-first order, fewest neighbours first."""
     ordered, visited = [start], {start}
     for name in ordered:
         ordered += sorted(near[name] - visited, key=lambda other: (len(near[other]), other))
@@ -215,7 +214,7 @@ def _breadth_first(start: int, near: Mapping[int, set[int]]) -> list[int]:
 def _find_passes(
     members: dict[int, list[int]], readers: dict[int, list[int]], feeling: Sequence[set[int]]
 ) -> list[list[int]]:
-    """Unknowns that are solved together because nothing depends on two of them."""
+    """Passes of unknowns that can be solved together because nothing depends on two of them."""
     passes, passes_of_group = list[list[int]](), {name: set[int]() for name in members}
     for name, own_members in members.items():
         dependent_groups = set[int]().union(*(feeling[k] for k in readers[name])) & members.keys()
@@ -235,7 +234,7 @@ def _find_passes(
 
 
 def _branch_of_bodies(system: System) -> list[int]:
-    """First movable body on the path from the ground to each body, or GROUND."""
+    """First movable body on the path from the ground to each body, or `GROUND`."""
     branches = list[int]()
     is_immobile = system.rows(lambda one: not one.nu and one.modal is None and one.section is None)
     for place, parent in enumerate(system.parents.tolist()):
@@ -247,7 +246,7 @@ def _branch_of_bodies(system: System) -> list[int]:
 
 
 def _speeds_by_group(system: System, group: Mapping[int, int]) -> dict[int, list[int]]:
-    """Speeds by group; every body belongs to one."""
+    """Speeds by group; every body belongs to one group."""
     speeds_found, first = dict[int, list[int]](), system.places["u"].tolist()
     speed_counts = system.rows(lambda one: one.nu).tolist()
     is_flexible = system.rows(lambda one: one.modal is not None)
@@ -260,7 +259,7 @@ def _speeds_by_group(system: System, group: Mapping[int, int]) -> dict[int, list
 
 
 def _effort_unknowns(engine: LoopedEngine) -> Iterator[tuple[int, int]]:
-    """Efforts by expressions of the state, and by couplings on hinges of the tree.
+    """Efforts of state-dependent expressions, and of couplings on hinges of the tree.
 
     Yields (index in the workspace, speed).
     """
@@ -283,8 +282,8 @@ def _effort_unknowns(engine: LoopedEngine) -> Iterator[tuple[int, int]]:
 def _loop_unknowns(engine: LoopedEngine) -> list[tuple[int, int, int, int]]:
     """Unknowns (frame, direction, speed, row) of closing hinges and couplings.
 
-    These are accelerations of their speeds, with row -1, and multipliers of their rows, with speed
-    -1; the frame of a coupling is -1.
+    Accelerations of their speeds have row -1, multipliers of their rows speed -1; the frame of a
+    coupling is -1.
     """
     packed, loops = engine.packed, engine.packed.written.loops
     unknowns = list[tuple[int, int, int, int]]()

@@ -1,4 +1,4 @@
-"""Tangent kernels of one scene, interpreted, or compiled if that saves time."""
+"""Tangent kernels of one scene: interpreted, or compiled if that saves time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..kernels.derivative_library import DerivativeLibrary
 from ..kernels.tape_kernel import TapeKernel
 from .fused_code import FusedCode
 
-#: Inputs of the kernel "accelerations", in its order.
+#: Inputs of the kernel "accelerations", in order.
 INPUTS = ("p", "t", "q", "u", "memory", "efforts")
 
 #: Pairs (input, output): the output is differentiated with respect to the input.
@@ -27,16 +27,16 @@ PAIRS = (
     ("t", "udot"), ("p", "udot"),
 )  # fmt: skip
 
-#: Number of directions that justifies a compilation.  Its time and the saving per direction both
-#: grow with the size of the kernels; measured break-even from 130 000 (7 balls) to 490 000 (24
-#: pins).
+#: Number of directions that justifies a compilation.  The compilation time and the saving per
+#: direction both grow with kernel size; measured break-even from 130 000 (7 balls) to 490 000
+#: (24 pins).
 WORTH_COMPILING = 300_000
 
 
 class TangentKernels:
     """Derivatives of the accelerations of one structure along given directions.
 
-    Safe to call from several threads.  Compiled code and the tape agree to rounding.
+    Thread-safe.  Compiled code and the interpreted tape agree to rounding.
     """
 
     def __init__(self, fusion: FusedCode, structure: Structure, parameters: bool) -> None:
@@ -65,7 +65,8 @@ class TangentKernels:
     ) -> Array:
         """Derivatives (states, n, length) of `output` along directions of the input `port`.
 
-        `states[name]` (states or 1, width) for every input; `directions` (states or 1, n, width).
+        `states[name]` is (states or 1, width) for every input, `directions` (states or 1, n,
+        width).
         """
         if self._library is not None:
             inputs = [states[name] for name in INPUTS]

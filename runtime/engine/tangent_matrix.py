@@ -1,9 +1,9 @@
 """Residual of a packed scene and its tangent, by the looped engine in O(bodies).
 
-R(t, q, u, a) are the efforts that the accelerations a need in addition to all acting loads; a are
-the accelerations of the motion if R = 0.  With closed loops the loads of their multipliers act too,
-and for closing hinges R is the error of their accelerations.  Implicit steps, equilibria and linear
-models need R and its tangent, which is eliminated from the tips to the root
+R(t, q, u, a) are the efforts that the accelerations a require in addition to all acting loads.
+The accelerations of the motion satisfy R = 0.  With closed loops the loads of the multipliers act
+too, and for closing hinges R is the acceleration error.  Implicit steps, equilibria and linear
+models use R and its tangent, which is eliminated from the tips to the root
 (derive/equations/tangent_sweep.py).
 """
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 
 class TangentMatrix:
-    """Residual and tangent of one scene; each thread needs its own.
+    """Residual and tangent of one scene; not thread-safe.
 
-    Prescribed and held speeds have no rows: their entries in residuals and solutions are zero.
+    Prescribed and fixed speeds have no rows: their entries in residuals and solutions are zero.
     """
 
     def __init__(self, engine: LoopedEngine, memory: Array | None = None) -> None:
@@ -51,7 +51,7 @@ class TangentMatrix:
             setattr(record, name, engine.pointer(getattr(self, name)))
 
     def residual(self, t: float, q: Array, u: Array, a: Array | None = None) -> Array:
-        """Residual R (nu,) at a state, to which the other calls refer from now on.
+        """Compute the residual R (nu,) at a state, to which subsequent calls refer.
 
         Without `a` the accelerations of the state are used; multipliers of closed loops are those
         of the state.
@@ -64,20 +64,20 @@ class TangentMatrix:
     def accelerations_rate(self) -> Array:
         """Partial derivative (nu,) of the accelerations with respect to time.
 
-        At the state of a residual without `a`; afterwards a tangent must be factored again.
+        Valid at the state of a residual without `a`; the tangent must be factored again afterwards.
         """
         rate = np.empty(self.nu)
         self._call("accelerations_rate", rate)
         return rate
 
     def slope(self, d_t: float, d_q: Array, d_u: Array, d_a: Array) -> Array:
-        """Derivative (nu,) of R along a direction of time, coordinates, speeds, accelerations."""
+        """Derivative (nu,) of R along a direction in time, coordinates, speeds, accelerations."""
         derivative = np.empty(self.nu)
         self._call("residual_slope", float(d_t), d_q, d_u, d_a, derivative)
         return derivative
 
     def matrices(self, t: float, q: Array, u: Array, a: Array, free: Sequence[int]) -> Array:
-        """Matrices M, C and K (3, n, n) about a state, to which other calls refer from now on.
+        """Compute M, C and K (3, n, n) about a state, to which subsequent calls refer.
 
         They are the derivatives of R with respect to the accelerations of the speeds `free`, to
         these speeds, and to the increments of coordinates along them.
@@ -103,16 +103,16 @@ class TangentMatrix:
         self._call("tangent_factor", float(rate), float(s), float(sq), float(kappa))
 
     def factor_laws(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
-        """Factor a cheap approximation of the tangent, with arguments as in `factor`.
+        """Factor an approximate tangent; arguments as in `factor`.
 
-        It contains inertia and the symmetric part of the derivatives of laws and modes only.
+        It contains only inertia and the symmetric part of the derivatives of laws and modes.
         """
         self._call("laws_factor", float(rate), float(s), float(sq), float(kappa))
 
     def solve(self, r: Array, d_q: Array | None = None, d_a: Array | None = None) -> Array:
-        """Solve for x (nu,) that changes R by r (nu,), with known changes in addition.
+        """Solve for x (nu,) that changes R by r (nu,), in addition to known changes.
 
-        Known are changes of coordinates (nq,) and accelerations (nu,), which must be zero for
+        Known changes are those of coordinates (nq,) and accelerations (nu,); they must be zero for
         prescribed speeds.
         """
         x, known_record, known_changes = np.empty(self.nu), self.engine.ffi.NULL, None
@@ -128,9 +128,9 @@ class TangentMatrix:
         return x
 
     def solve_laws(self, r: Array, d_q: Array | None = None, d_u: Array | None = None) -> Array:
-        """Changes (nu,) of accelerations that change R by r (nu,), after `factor_laws`.
+        """Solve for acceleration changes (nu,) that change R by r (nu,), after `factor_laws`.
 
-        Known changes of coordinates (nq,) and speeds (nu,) are added.
+        They are in addition to known changes of coordinates (nq,) and speeds (nu,).
         """
         changes = np.empty(self.nu)
         zeros = np.zeros(self.nu)
@@ -141,9 +141,9 @@ class TangentMatrix:
     def count_negative(self) -> int | None:
         """Number of negative eigenvalues of the last factored, symmetric tangent.
 
-        By Sylvester's law of inertia it is that of its pivots.  None if loads couple distant
-        bodies, which the pivots do not contain.  Factorisations with negative pivots fail unless
-        `allow_negative` was called before.
+        By Sylvester's law of inertia it equals that of the pivots.  None if loads couple distant
+        bodies, because pivots do not contain these loads.  Factorisations with negative pivots fail
+        unless `allow_negative` was called before.
         """
         if self.coupled:
             return None
@@ -151,10 +151,10 @@ class TangentMatrix:
         return int(count_negative(pivots[None], sizes)[0])
 
     def pivots(self) -> tuple[Integers, Array]:
-        """Sizes n (2 bodies,) of the pivots of the last factorisation, and their numbers.
+        """Sizes n (2 bodies,) and entries (sum of n^2,) of the pivots of the last factorisation.
 
-        Each body has a pivot of its shapes and one of its hinge; the numbers (sum of n^2,) of
-        hinges are those of the inverse.
+        Each body has a pivot for its shapes and one for its hinge; the entries for hinges are those
+        of the inverse.
         """
         engine, read_pivots = self.engine, self.engine.lib.mstmm_tangent_pivots
         sizes = np.zeros(2 * engine.packed.system.count, dtype=np.int32)
@@ -168,13 +168,13 @@ class TangentMatrix:
         self.record.counts = 1
 
     def rates(self, q: Array, u: Array) -> Array:
-        """Rates N(q) u (nq,), zero for prescribed coordinates; invalidates the residual's state."""
+        """Rates N(q) u (nq,), zero for prescribed coordinates; invalidates the residual state."""
         dq = np.zeros(self.nq)
         self._call("tangent_rates", q, u, dq)
         return dq
 
     def coordinates(self, x: Array, rho: Array | None = None) -> Array:
-        """Change dq (nq,) of coordinates along x: sq dq = kappa g_q dq + N x + rho."""
+        """Coordinate change dq (nq,) along x: sq dq = kappa g_q dq + N x + rho."""
         dq = np.zeros(self.nq)
         null = self.engine.ffi.NULL
         self._call("tangent_coordinates", x, null if rho is None else rho, dq)
@@ -198,7 +198,7 @@ class TangentMatrix:
 
 
 def thread_tangent(engine: LoopedEngine) -> TangentMatrix:
-    """Tangent of an engine for this thread, with no releases and no turns counted."""
+    """Tangent of an engine for this thread, without releases or counted turns."""
     thread_data, size = engine.local, engine.packed.workspace
     if getattr(thread_data, "tangent_of", None) != size:
         thread_data.tangent = TangentMatrix(engine)
@@ -207,7 +207,7 @@ def thread_tangent(engine: LoopedEngine) -> TangentMatrix:
 
 
 def count_negative(pivots: Array, sizes: Integers) -> Integers:
-    """Count negative eigenvalues (k,) in rows of pivots (k, sum of n^2), without zeros."""
+    """Count negative eigenvalues (k,) in rows of pivots (k, sum of n^2), which are non-zero."""
     squares = np.square(sizes)
     firsts = np.cumsum(squares) - squares
     counts = np.zeros(len(pivots), dtype=np.int64)
@@ -220,9 +220,9 @@ def count_negative(pivots: Array, sizes: Integers) -> Integers:
 
 
 def _lay_out_tangent(engine: LoopedEngine) -> int:
-    """Number of values that the tangent stores.
+    """Lay out the tangent and return the number of values that it stores.
 
-    SceneError for elements that were generated by an old version without derivatives.
+    Raises SceneError for elements generated by an earlier version without derivatives.
     """
     packed = engine.packed
     count = int(engine.lib.mstmm_tangent_lay(packed.model))
