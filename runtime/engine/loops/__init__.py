@@ -1,1 +1,1 @@
-"""Closed loops in the looped engine: assembly, rank, and the analysis that a model shows."""
+"""Closed loops in the looped engine: assembly, rank and analysis."""

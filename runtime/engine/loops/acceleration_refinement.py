@@ -1,7 +1,7 @@
-"""Number of refinements that accelerations need with heavy bodies outboard of light ones.
+"""Number of acceleration refinements for heavy bodies outboard of light ones.
 
-A refinement solves for the residual of inverse dynamics and adds the correction; it is repeated as
-long as results change.  The last change estimates the error before it.
+A refinement solves for the residual of inverse dynamics and adds the correction; it is repeated
+until results no longer change.  The last change estimates the error before it.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from ...packing.initial_state import start_values
 from ..looped_engine import LoopedEngine
 from .near_parallel_axes import MIN_COUNTING_ANGLE, find_skewed_axis
 
-#: Relative change of accelerations that is rounding, and one above which they are rejected.
+#: Relative change of accelerations that counts as rounding, and the largest accepted one.
 _ROUNDING, _MAX_ERROR = 1e-12, 1e-6
 #: Accelerations below this fraction of those due to weight, speeds or efforts count as balanced.
 _BALANCED_FRACTION = 1e-3
-#: Mass ratio above which the masses may be the cause of lost digits.
+#: Mass ratio above which the masses may cause a loss of digits.
 _MIN_MASS_RATIO = 100.0
 #: Maximum number of refinements.
 _MAX_REFINEMENTS = 4
 
 
 def count_refinements(engine: LoopedEngine, q: Array, u: Array, mobility: int) -> int:
-    """Number of refinements until accelerations at (q, u) no longer change.
+    """Number of refinements until the accelerations at (q, u) converge.
 
-    Accelerations due to random efforts are tested too.  Raises NumericalFailure if they do not
-    converge.
+    Accelerations due to random efforts are tested too.  Raises NumericalFailure if refinement does
+    not reduce a large error.
     """
     model = engine.packed.model
     efforts = np.random.default_rng(0).uniform(-1.0, 1.0, (2, engine.nu))
@@ -45,7 +45,7 @@ def count_refinements(engine: LoopedEngine, q: Array, u: Array, mobility: int) -
     characteristic_acceleration = weight + float(np.abs(u).max(initial=0.0)) ** 2
     characteristic_acceleration = (
         characteristic_acceleration if mobility > 0 else max(characteristic_acceleration, 1.0)
-    )  # mechanisms moved by drives may be at rest
+    )  # driven mechanisms may be at rest
     try:
         previous = answers(0)
         for count in range(1, _MAX_REFINEMENTS + 1):
@@ -73,7 +73,7 @@ def count_refinements(engine: LoopedEngine, q: Array, u: Array, mobility: int) -
 
 
 def count_tree_refinements(engine: LoopedEngine) -> int:
-    """Number of refinements of a tree at its start with sweep="refined": at least one.
+    """Number of refinements of a tree at its initial state with sweep="refined": at least one.
 
     Raises SceneError if accelerations do not converge.
     """
@@ -86,9 +86,9 @@ def count_tree_refinements(engine: LoopedEngine) -> int:
 
 
 def mass_ratio_text(engine: LoopedEngine) -> str:
-    """End of a message that names the heaviest and the lightest body, with a remedy.
+    """Cause of lost digits for a message: heaviest and lightest body, with a remedy.
 
-    If their masses are similar, another cause of lost digits in closed loops is named.
+    If their masses are similar, another cause in closed loops is named.
     """
     masses = {body.name: body.mass for body in engine.packed.described.body if body.mass > 0}
     if not masses:

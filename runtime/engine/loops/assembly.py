@@ -1,9 +1,9 @@
-"""Assembly: the nearest state in which the loops are closed.
+"""Assembly of closed loops: nearest state that satisfies all constraints.
 
-Positions are found by steps with compliant rows (Levenberg, Quart. Appl. Math. 2 (1944) 164-168):
-with mu times their mobility on the diagonal of L a step is the change of least inertia that closes
-the gaps as far as mu permits, and it stays bounded far from a closed state.  Speeds need one
-correction because velocity errors are linear in them.
+Positions are iterated with compliant rows (Levenberg, Quart. Appl. Math. 2 (1944) 164-168): with mu
+times their mobility on the diagonal of L, a step is the change of least inertia that closes the
+gaps as far as mu permits, and it remains bounded far from a closed state.  One correction suffices
+for speeds because velocity errors are linear in them.
 """
 
 from __future__ import annotations
@@ -31,30 +31,30 @@ from .near_parallel_axes import MIN_COUNTING_ANGLE, find_skewed_axis, find_skewe
 _MAX_STEP, _MAX_STEPS = 0.5, 300
 #: Compliance of the rows: initial, maximum and minimum.
 _INITIAL_COMPLIANCE, _MAX_COMPLIANCE, _MIN_COMPLIANCE = 1e-2, 1e8, 1e-12
-#: Paths along which misfits close are so many times longer than the misfits.
+#: Path length relative to a gap; gaps that need a longer path to close count as misfits.
 _LONG_PATH_RATIO = 50.0
-#: Gap (m, rad) that counts as closed for distances of hinges up to 1 m, and change (rad, m) at
-#: which the iteration has converged.
+#: Gap (m, rad) that counts as closed for hinge distances up to 1 m, and change (rad, m) at
+#: convergence.
 _CLOSED_GAP, _NEGLIGIBLE_CHANGE = 1e-10, 1e-9
-#: Number of other starts if one leads to an open loop, and their distance from it (rad, m).
+#: Number of other starts if the first one leaves a loop open, and their distance from it (rad, m).
 _MAX_STARTS, _START_DISTANCE = 4, 0.1
-#: Maximum number of choices of rows.
+#: Maximum number of choices among interchangeable rows.
 _MAX_CHOICES = 4
 #: Maximum number of hinges named in a message.
 _MAX_NAMES = 8
-#: Distance of a mass centre, relative to the size of the scene, beyond which its body hardly moves.
+#: Mass centre distance relative to the size of the scene above which its body hardly moves.
 _FAR_MASS_RATIO = 1e5
-#: Permitted velocity errors relative to the largest speed; smallest pivot of an independent row
+#: Permitted velocity error relative to the largest speed; smallest pivot of an independent row
 #: relative to its mobility.
 _MAX_VELOCITY_ERROR, _MIN_INDEPENDENT_PIVOT = 1e-8, 1e-15
-#: Compliance so large that only the coordinates of closing hinges change.
+#: Compliance at which only the coordinates of closing hinges change.
 _CUT_ONLY_COMPLIANCE = 1e14
 
 
 def engine_with_held(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEngine:
     """Engine of the same scene with all speeds of some hinges prescribed.
 
-    Flexible bodies have their stiffness at rest in it.
+    Flexible bodies retain their stiffness at rest.
     """
     packed = engine.packed
     held_places = {packed.hinge_position[name] for name in hinges}
@@ -70,9 +70,9 @@ def engine_with_held(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEng
 
 
 class Assembly:
-    """Assembly of one packed scene at `t` (s) with some hinges held, near `q` (nq,).
+    """Assembly of one packed scene at `t` (s) near `q` (nq,), with some hinges fixed.
 
-    `behind` returns the end of a message with the cause of loops that do not close near a q.
+    `behind` returns the cause of loops that do not close near a q, for messages, or "".
     """
 
     def __init__(
@@ -84,15 +84,15 @@ class Assembly:
         if self.calls.engine is not engine:
             self.calls.judge_by([q])
         self._weights = self._weighted()
-        #: 1 for speeds that are neither held nor driven, else 0.
+        #: 1 for speeds that are neither fixed nor driven, else 0.
         self.free = self._free_speeds()
 
     def positions(self, q: Array, much: float = 0.0, rough: bool = True) -> Array:
         """Close the loops near q (nq,).
 
-        Gaps of up to `much` (m, rad) that no change closes may remain; with `rough` also those that
-        close only after a long path.  Raises OpenLoop with the smallest gap, its pose and the held
-        hinges if there is no such state near.
+        Gaps up to `much` (m, rad) that no change closes may remain; with `rough` also those that
+        close only after a long path.  Raises LoopClosureError with the smallest gap, its pose and
+        the fixed hinges if there is no such state nearby.
         """
         random_generator, start = np.random.default_rng(0), q
         rough = rough and much > 0.0
@@ -100,7 +100,7 @@ class Assembly:
         for _ in range(_MAX_STARTS):
             if self._closes(gaps, much):
                 return nearest
-            # With all links in line the direction of bending is undetermined.
+            # Perturb the start: with all links in line the direction of bending is undetermined.
             change = (
                 random_generator.uniform(-_START_DISTANCE, _START_DISTANCE, len(self._still))
                 * self.free
@@ -114,7 +114,7 @@ class Assembly:
         raise LoopClosureError(self._open(nearest, gaps), gap, self.by_names(nearest))
 
     def nearest_closed(self, q: Array, much: float = 0.0) -> Array | None:
-        """State (nq,) to which steps from q lead if its gaps are at most `much`, else None."""
+        """State (nq,) reached from q if its gaps are at most `much`, else None."""
         try:
             nearest_q, gaps = self._nearest(q, much > 0.0)
         except NumericalFailure:
@@ -122,9 +122,9 @@ class Assembly:
         return nearest_q if self._closes(gaps, much) else None
 
     def _nearest(self, q: Array, rough: bool = False) -> tuple[Array, Array]:
-        """State of the smallest gap to which steps from q lead, and the errors of the rows there.
+        """State of smallest gap reached from q, and the row errors there.
 
-        With `rough`, misfits that close only after a long path along a motion remain.
+        With `rough`, misfits remain that close only after a long path.
         """
         self.calls.choose(q)
         for _ in range(_MAX_CHOICES):
@@ -134,7 +134,7 @@ class Assembly:
         return q, gaps
 
     def _stepped(self, q: Array, rough: bool) -> tuple[Array, Array]:
-        """Result of `_nearest` for the rows chosen at present."""
+        """Result of `_nearest` for the current choice of rows."""
         q, compliance, remaining_path = self._own(q), _INITIAL_COMPLIANCE, np.inf
         error = self._rest(q)
         for _ in range(_MAX_STEPS):
@@ -167,7 +167,7 @@ class Assembly:
         return q, self._lacking(q, self._still, self.calls.gap, _MAX_COMPLIANCE)[1]
 
     def _lacking(self, q: Array, u: Array, level: int, give: float = 0.0) -> tuple[Array, Array]:
-        """Correction and errors of the rows, without misfits of rows that are not satisfied now."""
+        """Correction and row errors; misfits of rows not chosen at present count as zero."""
         change, errors = self.calls.correction(level, q, u, give)
         max_misfit = self._locks * max(1.0, float(np.abs(u).max(initial=0.0)))
         is_misfit = self.calls.resting() & (np.abs(errors) <= max_misfit)
@@ -176,13 +176,13 @@ class Assembly:
     def speeds(self, q: Array, u: Array) -> Array:
         """Remove the velocity errors of u (nu,) at the closed q.
 
-        SceneError if the held speeds do not permit it.
+        Raises SceneError if the fixed speeds do not permit it.
         """
         self.calls.choose(q)
         u, errors = self._without_slips(q, u)
         is_counting = self.calls.inverses() > 0
         if self._slipping(u, errors) is not None and not is_counting.all():
-            # Near a singular pose small pivots above rounding still belong to independent rows.
+            # Near a singular pose, small pivots above rounding belong to independent rows.
             floors = [self.calls.records.floor(row) for row in range(self.calls.count)]
             for k, mobility in enumerate(self.calls.mobility.tolist()):
                 self.calls.records.judge(k, _MIN_INDEPENDENT_PIVOT * mobility)
@@ -202,10 +202,10 @@ class Assembly:
         return u
 
     def _without_slips(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """Speeds u with corrected velocity errors, and the remaining errors of the rows."""
+        """Speeds u with corrected velocity errors, and the remaining row errors."""
         change, errors = self._lacking(q, u, self.calls.slip)
         largest = self._largest(errors)
-        while True:  # once, except for digits lost because of heavy outboard bodies
+        while True:  # once, unless heavy outboard bodies cause a loss of digits
             trial = u + self.free * change
             change, trial_errors = self._lacking(q, trial, self.calls.slip)
             if not self._largest(trial_errors) < largest:
@@ -213,7 +213,7 @@ class Assembly:
             u, errors, largest = trial, trial_errors, self._largest(trial_errors)
 
     def _slipping(self, u: Array, missing: Array) -> int | None:
-        """Row with the largest velocity error if that exceeds rounding, else None."""
+        """Row with the largest velocity error if it exceeds rounding, else None."""
         max_slip = _MAX_VELOCITY_ERROR * max(1.0, float(np.abs(u).max(initial=0.0)))
         slips = np.abs(missing) / self._sizes
         return int(slips.argmax()) if slips.max(initial=0.0) > max_slip else None
@@ -236,12 +236,15 @@ class Assembly:
         return np.zeros(self.calls.engine.nu)
 
     def _correction(self, q: Array, give: float) -> tuple[Array, Array]:
-        """Correction of the gaps, and the gaps; held coordinates stay, though their rows comply."""
+        """Correction of the gaps, and the gaps.
+
+        Fixed coordinates do not change, although their rows comply.
+        """
         change, gaps = self._lacking(q, self._still, self.calls.gap, give)
         return self.free * change, gaps
 
     def _own(self, q: Array) -> Array:
-        """Adapt the coordinates of closing hinges in q to the positions of the bodies."""
+        """Adapt the coordinates of closing hinges in q to the body positions."""
         for _ in range(12):
             change, _ = self._correction(q, _CUT_ONLY_COMPLIANCE)
             length = float(np.abs(change).max(initial=0.0))
@@ -256,16 +259,16 @@ class Assembly:
             return float(np.sum(self._weights * gaps**2))
 
     def _closes(self, missing: Array, much: float = 0.0) -> bool:
-        """True if all gaps are zero relative to the scene's size, or at most `much`."""
+        """True if all gaps are zero relative to the scene size, or at most `much`."""
         return bool(np.all(np.abs(missing) <= np.maximum(much, _CLOSED_GAP * self._sizes)))
 
     def _largest(self, missing: Array) -> float:
         return float(np.abs(missing).max(initial=0.0))
 
     def _weighted(self) -> Array:
-        """Weights (rows,) of the gaps: the inverse mean mobility of lengths, angles or couplings.
+        """Weights (rows,) of the gaps: inverse mean mobility of lengths, angles or couplings.
 
-        Equal weights within a kind make the smallest gap a property of the geometry.
+        With equal weights within a kind the smallest gap depends only on the geometry.
         """
         calls = self.calls
         is_angle = np.zeros(calls.count, bool)
@@ -287,7 +290,7 @@ class Assembly:
             calls.records.scale(row, 1.0 / float(weights[row]))
         return weights
 
-    # --- words ------------------------------------------------------------------------------------
+    # --- messages ---------------------------------------------------------------------------------
 
     def _open(self, q: Array, missing: Array) -> str:
         row = int(np.abs(missing).argmax())
@@ -298,13 +301,13 @@ class Assembly:
         )
 
     def by_names(self, q: Array) -> dict[str, tuple[float, ...]]:
-        """Coordinates q by the names of hinges and flexible bodies."""
+        """Coordinates q by hinge and flexible body name."""
         layout = self.calls.engine.packed.layout
         slots = {**layout.hinges, **layout.modal}
         return {name: tuple(q[slot.q_slice].tolist()) for name, slot in slots.items() if slot.nq}
 
     def _names(self) -> str:
-        """Names of the held or driven hinges for messages."""
+        """Names of the fixed or driven hinges for messages."""
         names = [f'"{name}"' for name in (*self.held, *self._driven())]
         return ", ".join(names[:_MAX_NAMES]) + (" ..." if names[_MAX_NAMES:] else "")
 
@@ -324,7 +327,7 @@ class Assembly:
         return f"the loop that {owner} closes stays open"
 
     def _far_mass(self) -> str:
-        """End of a message that names a body with an implausibly distant mass centre, or ""."""
+        """Message part that names a body with an implausibly distant mass centre, or ""."""
         bodies = self.calls.engine.packed.described.body
         size = max(
             (math.hypot(*end.position) for b in bodies for end in b.ends.values()), default=0

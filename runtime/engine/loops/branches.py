@@ -1,9 +1,9 @@
-"""Branches on which loops can close, and the search for the one nearest to a requested state.
+"""Assembly branches of closed loops, and the search for the nearest one.
 
 Steps from a start lead to one branch, usually but not always the nearest.  The search therefore
-also starts from bodies placed by the initial states of all hinges that state one, cut or not, and
-from random positions.  On each branch it moves to the state nearest to the requested one, and the
-nearest branch is used.
+also starts from bodies placed by all initial states given for hinges, cut or not, and from random
+positions.  On each branch it moves to the state nearest to the requested one; the nearest branch is
+used.
 """
 
 from __future__ import annotations
@@ -26,28 +26,28 @@ from ...packing.scene_packing import pack
 from ..looped_engine import LoopedEngine
 from .assembly import Assembly
 
-#: Maximum number of random starts, of their speeds in total, and of the speeds of one; maximum
-#: number of hinges of a scene whose bodies are placed again.
+#: Maximum number of random starts, of their speeds in total, and of speeds per start; maximum
+#: number of hinges of a scene with bodies placed by their initial states.
 _MAX_STARTS, _MAX_TOTAL_SPEEDS, _MAX_SPEEDS, _MAX_PLACED_HINGES = 12, 240, 60, 300
-#: Maximum number of steps on a branch, the longest step, and one that counts as none (rad, m).
+#: Maximum number of steps on a branch, longest step, and negligible step (rad, m).
 _MAX_STEPS, _MAX_STEP, _NEGLIGIBLE_STEP = 40, 0.5, 1e-4
-#: A squared norm of speeds that counts as zero.
+#: Squared norm of speeds that counts as zero.
 _NEGLIGIBLE_SQUARE = 1e-30
-#: Largest distance (rad, m) of two states on the same branch.
+#: Largest distance (rad, m) between settled states that count as the same branch.
 _MAX_BRANCH_DISTANCE = 1e-2
-#: A start within this distance (rad, lengths) is the nearest; smallest difference that counts.
+#: Distance (rad, lengths) below which a start counts as nearest; smallest significant difference.
 _NEAREST_DISTANCE, _MIN_IMPROVEMENT = 1e-3, 1e-6
 
 
 @dataclass(frozen=True)
 class Branch:
-    """Branch on which the loops close.
+    """Assembly branch of closed loops.
 
     Attributes:
-        distance: distance from the requested initial coordinates: root of the sum of squares, of
-            angles in rad, of lengths relative to the mean distance of hinges.
+        distance: distance from the requested initial coordinates: root of the sum of squares of
+            angles in rad and of lengths relative to the mean distance of hinges.
         q: (nq,) state on the branch that is nearest to the start.
-        pose: the same by the names of hinges.
+        pose: the same by hinge name.
     """
 
     distance: float
@@ -56,10 +56,10 @@ class Branch:
 
 
 class RequestedCoordinates:
-    """Requested coordinates `q` (nq,); those of hinges in `kept` are satisfied in any case.
+    """Requested coordinates `q` (nq,); those of hinges in `kept` are always satisfied.
 
-    With `stated` only initial states in the scene count.  If several hinges carry one body, the
-    coordinates of the others are free if they are zero, like those without an initial state.
+    With `stated` only initial states given in the scene count.  If several hinges carry one body,
+    coordinates of the others that are zero are free, as are those without an initial state.
     """
 
     def __init__(
@@ -90,14 +90,14 @@ class RequestedCoordinates:
                 (self.lengths if is_sliding else self.angles).extend([slots.q + k] * counts)
 
     def off(self, q: Array) -> Array:
-        """Deviation (nq,) of q from the requested coordinates; angles within half a turn."""
+        """Deviation (nq,) of q from the requested coordinates; angles wrapped to half a turn."""
         deviation = np.zeros(len(q))
         deviation[self.lengths] = (q - self.q)[self.lengths]
         deviation[self.angles] = _wrap_angles((q - self.q)[self.angles])
         return deviation
 
     def distance(self, q: Array) -> float:
-        """Distance of q from the requested coordinates, see `Branch`."""
+        """Distance of q from the requested coordinates; see `Branch`."""
         deviation = self.off(q)
         squares = float(np.sum(deviation[self.angles] ** 2))
         squares += float(np.sum((deviation[self.lengths] / self._length) ** 2))
@@ -107,7 +107,7 @@ class RequestedCoordinates:
         return math.sqrt(squares)
 
     def nearest_turn(self, q: Array) -> Array:
-        """Shift the angles of q by whole turns to be nearest to the requested ones."""
+        """Shift the angles of q by whole turns, next to the requested ones."""
         shifted = q.copy()
         shifted[self.turning] = (self.q + _wrap_angles(q - self.q))[self.turning]
         return shifted
@@ -122,7 +122,7 @@ class RequestedCoordinates:
         return change
 
     def drawn(self, draw: np.random.Generator) -> Array:
-        """Random change (nu,) along the speeds: up to half a turn, or the length of the scene."""
+        """Random change (nu,) along the speeds: up to half a turn or the scene length."""
         change, layout = np.zeros(self.packed.layout.nu), self.packed.layout
         for hinge in self.packed.described.hinge:
             slots, facts = layout.hinges[hinge.name], hinge.facts
@@ -134,10 +134,9 @@ class RequestedCoordinates:
 
 
 class BranchSearch:
-    """Search for branches near `wishes` on which `assembly` closes the loops, gaps up to `much`.
+    """Search for branches near `wishes` on which `assembly` closes loops to gaps of `much`.
 
-    The branch of `first` (nq,), to which steps from the start lead, precedes others that are as
-    near.
+    The branch of `first` (nq,), reached from the start, precedes others at the same distance.
     """
 
     def __init__(
@@ -146,11 +145,11 @@ class BranchSearch:
         self._assembly, self._wishes, self._first, self._much = assembly, wishes, first, much
 
     def is_near(self) -> bool:
-        """True if `first` is at the requested coordinates: no other branch is nearer."""
+        """True if `first` is at the requested coordinates, so that no branch is nearer."""
         return self._wishes.distance(self._first) < _NEAREST_DISTANCE
 
     def nearest(self) -> Array:
-        """State `first` (nq,), or one on a nearer branch."""
+        """State (nq,) on the nearest branch: `first` unless another branch is nearer."""
         if len(self.found) < 2:
             return self._first
         nearest_branch, first_distance = self.found[0], self._wishes.distance(self._settled_first)
@@ -160,7 +159,7 @@ class BranchSearch:
 
     @cached_property
     def found(self) -> tuple[Branch, ...]:
-        """All branches found, the nearest first."""
+        """Branches found, the nearest first."""
         starts = (self._assembly.nearest_closed(start, self._much) for start in self._starts())
         closed_states = [closed for closed in starts if closed is not None]
         requested, states = self._wishes, [self._settled_first if closed_states else self._first]
@@ -234,7 +233,7 @@ def _wrap_angles(angles: Array) -> Array:
 
 
 def _hinges_with_initial_state(scene: Scene) -> list[Hinge]:
-    """Hinges whose initial states count."""
+    """Hinges whose initial states are requested coordinates."""
     determining_hinges = {
         body: _determining_hinge(hinges) for body, hinges in _hinges_by_outboard_body(scene).items()
     }
@@ -255,7 +254,7 @@ def _hinges_by_outboard_body(scene: Scene) -> dict[str, list[Hinge]]:
 
 
 def _determining_hinge(hinges: list[Hinge]) -> Hinge:
-    """Of several hinges with the same outboard body, the one that determines its initial state."""
+    """Hinge that determines the initial state of a body, out of all its inboard hinges."""
     return next((hinge for hinge in hinges if _has_nondefault_q(hinge)), hinges[0])
 
 
@@ -264,7 +263,7 @@ def _has_initial_q(hinge: Hinge) -> bool:
 
 
 def _has_nondefault_q(hinge: Hinge) -> bool:
-    """True if a hinge states an initial q that differs from the default."""
+    """True if a hinge has an initial q that differs from the default."""
     if hinge.initial is None or not hinge.initial.q or hinge.facts is None:
         return False
     default_q = default_coordinates(len(hinge.initial.q), hinge.facts.quaternion)
@@ -274,7 +273,7 @@ def _has_nondefault_q(hinge: Hinge) -> bool:
 def _start_from_placed_bodies(
     packed: PackedScene, q: Array, kept: Collection[str], much: float
 ) -> Array | None:
-    """Closed start (nq,) with every body placed by the hinge that states its initial state.
+    """Closed start (nq,) with every body placed by the hinge that determines its initial state.
 
     None if the tree is the same, if the loops do not close from there, and for large scenes.
     """
@@ -306,7 +305,7 @@ def _start_from_placed_bodies(
 
 
 def _convert_q(q: Array, packed: PackedScene, other: PackedScene) -> Array:
-    """Convert q (nq,) of a scene to that of the same scene with other cuts."""
+    """Convert q (nq,) of a scene to that of the same scene with other cut hinges."""
     converted = np.zeros(other.layout.nq)
     for hinge in packed.described.hinge:
         converted[other.layout.hinges[hinge.name].q_slice] = q[

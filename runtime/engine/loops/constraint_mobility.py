@@ -1,6 +1,6 @@
-"""Mobility of constraint rows: response of the free adjacent bodies to a unit load of a row.
+"""Mobility of constraint rows: response of the adjacent free bodies to a unit load of a row.
 
-It is the reference for the pivots of the rows.
+It is the reference for the row pivots.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from .loop_workspace import LoopWorkspace
 
 
 def row_mobilities(numbers: LoopWorkspace) -> Array:
-    """Mobility J M^-1 J^T of both ends of every row (rows,), after a correction.
+    """Mobility J M^-1 J^T (rows,) of both ends of every row, after a correction.
 
-    Rows between bodies without mass get the mean of the others.
+    Rows between massless bodies get the mean of the others.
     """
     mobility, body_masses = np.zeros(numbers.count), _BodyMasses(numbers.engine)
     for closure in numbers.records.closures:
@@ -39,7 +39,7 @@ def row_mobilities(numbers: LoopWorkspace) -> Array:
 def _coupling_mobility(numbers: LoopWorkspace, one: WrittenCoupling, masses: _BodyMasses) -> float:
     """Mobility C^T D^-1 C of a coupling, summed over its hinges.
 
-    D is that of the hinge's single body; a hinge that closes a loop counts as its rows do.
+    D is that of the single body of the hinge; a closing hinge counts like its rows.
     """
     mobility, closures = 0.0, {closure.frame: closure for closure in numbers.records.closures}
     for place in one.columns:
@@ -70,12 +70,12 @@ def _hinge_mobility(engine: LoopedEngine, place: int, slopes: Array, masses: _Bo
 
 
 def _pseudo_inverse(matrix: Array) -> Array:
-    """Pseudo-inverse: directions without inertia do not move."""
+    """Pseudo-inverse, in which directions without inertia do not move."""
     return np.asarray(np.linalg.pinv(matrix, rcond=1e-12, hermitian=True), dtype=np.float64)
 
 
 class _BodyMasses:
-    """Mass matrices of single bodies about input ends, and inverses; equal bodies share them."""
+    """Mass matrices of single bodies about input ends and their inverses, cached by body data."""
 
     def __init__(self, engine: LoopedEngine) -> None:
         self.engine, self.which = engine, engine.packed.system.which

@@ -1,10 +1,10 @@
 """Rank of constraint rows: redundant rows of closed loops, and singular configurations.
 
-The rank is determined once, at a state in which the loops are closed, and in a metric of the
-hinges.  With true masses a heavy coupler makes independent rows look like rounding.  With any
-masses of bodies, parts attached to the hinges of a loop, as the rest of a long mast, do so too.
-The pivot of a row that is redundant up to a misfit is proportional to the square of the misfit.
-A row that is redundant here but not in closed states nearby indicates a singular pose.
+The rank is determined once, at a state with closed loops, in a metric of the hinges.  In the metric
+of the true masses, a heavy coupler would reduce pivots of independent rows to rounding; in that of
+any body masses, so would parts attached to a loop, such as the rest of a long mast.  The pivot of a
+row that is redundant up to a misfit is proportional to the square of the misfit.  A row that is
+redundant here but not in closed states nearby indicates a singular pose.
 """
 
 from __future__ import annotations
@@ -30,20 +30,19 @@ from .loop_calls import REDUNDANT_PIVOT, LoopCalls
 from .self_stress import IndeterminateLoads, find_indeterminate_loads
 
 #: Closed states nearby: number, distance (rad, m), and the factor by which the coordinates of cut
-#: hinges, which only follow, may exceed it.
+#: hinges, which are dependent, may exceed it.
 _NEIGHBOUR_COUNT, _NEIGHBOUR_DISTANCE, _MAX_CUT_FACTOR = 3, 3e-2, 10.0
-#: Over this distance (rad, m) a row that is redundant up to a misfit leaves no gap that locks.
+#: Distance (rad, m) over which a row that is redundant up to a misfit must not lock.
 _FAR_DISTANCE = 0.3
-#: A closed state nearer than this fraction of the requested distance is the pose itself.
+#: Closed states nearer than this fraction of the requested distance count as the pose itself.
 _MIN_DISTANCE_RATIO = 0.1
-#: Around a singular pose: maximum number of trials; distance (rad, m) over which, and relative
-#: deviation up to which, speeds without velocity errors must lead on from a state; its accuracy
-#: (rad, m).
+#: Around a singular pose: maximum number of trials; distance (rad, m) over which a motion must
+#: continue from a state, and its largest relative deviation; accuracy of the state (rad, m).
 _MAX_TRIALS, _CONTINUATION_DISTANCE, _MAX_DEVIATION, _STATE_ACCURACY = 16, 3e-3, 0.2, 1e-8
-#: A row that is redundant here is redundant there too if its pivot is at most so many times larger,
-#: or at most rounding, relative to the mobility.
+#: A row that is redundant at the pose is redundant in another state if its pivot is at most this
+#: many times larger, or at most rounding relative to the mobility.
 _MAX_PIVOT_RATIO, _PIVOT_ROUNDING = 1e2, 1e-12
-#: Maximum number of steps to such a state, gap (m, rad) that counts as closed, initial compliance
+#: Maximum number of steps to a closed state, gap (m, rad) that counts as closed, initial compliance
 #: of rows, and compliance relative to the remaining gap.
 _MAX_STEPS, _CLOSED_GAP, _INITIAL_COMPLIANCE, _COMPLIANCE_PER_GAP = 200, 1e-9, 1e-6, 1e-2
 
@@ -54,14 +53,14 @@ class Rank:
 
     Attributes:
         here: rows that are redundant at the state.
-        always: those of them that are redundant in closed states nearby too.
-        going: those of these that are removed; the others may replace another row of their hinge
+        always: rows of `here` that are also redundant in closed states nearby.
+        going: rows of `always` that are removed; the others may replace another row of their hinge
             that becomes redundant in a pose farther away.
-        states: the examined states (nq,), the given one first.
-        open: the loads that redundant rows leave undetermined.
+        states: examined states (nq,), the given one first.
+        open: loads that are indeterminate because of redundant rows.
         nearby: smallest number of redundant rows in any of the states.
-        stuck: motions that close the loops to first order all lead back to the pose, as with links
-            stretched out in line.
+        stuck: True if all motions that close the loops to first order lead back to the pose, as
+            with links stretched out in line.
     """
 
     here: frozenset[int]
@@ -108,10 +107,10 @@ def find_rank(engine: LoopedEngine, q: Array) -> Rank:
 def _states_around(
     calls: LoopCalls, q: Array, here: frozenset[int], level: Array
 ) -> tuple[list[Array], bool]:
-    """Closed states nearby, and whether all motions to such states lead back.
+    """Closed states nearby, and whether all motions to such states lead back to the pose.
 
-    Around a singular pose only states are used, if any, from which a motion leads on: others are
-    closed by rounding, or motions branch there.
+    Around a singular pose, states from which a motion continues are preferred: others are closed
+    only by rounding, or motions branch there.
     """
     random_generator, distances, states = np.random.default_rng(0), list[float](), list[Array]()
 
@@ -143,7 +142,7 @@ def _states_around(
 
 
 def _largest_change(calls: LoopCalls, change: Array) -> float:
-    """Largest change of q (nq,), without the coordinates of cut hinges, which follow."""
+    """Largest change of q (nq,), without the dependent coordinates of cut hinges."""
     change_of_tree, packed = change.copy(), calls.engine.packed
     for cut in packed.expanded.cuts:
         if cut.constraint is None:
@@ -154,7 +153,7 @@ def _largest_change(calls: LoopCalls, change: Array) -> float:
 def geometric_loop_calls(engine: LoopedEngine, q: Array) -> LoopCalls:
     """Loop calls of a scene in the metric of its hinges, with mobilities of equal bodies.
 
-    Bodies that were merged for simplification are separate in it, with their welds.
+    Bodies merged by simplification are separate again, with their welds.
     """
     packed = without_merging(engine.packed)
     mobility = LoopCalls(
@@ -173,7 +172,7 @@ def _interchangeable_rows(calls: LoopCalls, q: Array, left_out: frozenset[int]) 
     """Redundant rows that become independent if another row of their hinge is omitted.
 
     They are kept, and the rows to use are chosen during the motion.  All hinges are tried at the
-    same time: the first omitted row of each instead of its first kept row, and so on.
+    same time: the first omitted row of each replaces its first kept row, and so on.
     """
     rows_by_hinge = [set(closure.rows.values()) for closure in calls.records.closures]
     omitted_and_kept = [
@@ -205,9 +204,9 @@ def _redundant_rows(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
 
 
 def _closed_neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Array | None:
-    """Closed state in the direction of speeds without velocity errors, to `settled` (rad, m).
+    """Closed state along the projected `speeds`, to an accuracy of `settled` (rad, m).
 
-    None if these speeds lead to none.
+    None if they lead to none.
     """
     try:
         ahead_q = _move_along(calls, q, speeds, _NEIGHBOUR_DISTANCE, np.zeros(calls.count))
@@ -219,8 +218,8 @@ def _closed_neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float)
 def _is_misfit_only(calls: LoopCalls, q: Array, left: frozenset[int], apart: float) -> bool:
     """True if the rows `left` are redundant up to a misfit.
 
-    A motion without them must lead far away in both directions, and leave gaps of these rows of at
-    most `apart` (m, rad).
+    A motion without them must lead far away in both directions, with gaps of these rows of at most
+    `apart` (m, rad).
     """
     pivot_levels = np.zeros(calls.count)
     pivot_levels[list(left)] = np.inf
@@ -243,7 +242,7 @@ def _is_misfit_only(calls: LoopCalls, q: Array, left: frozenset[int], apart: flo
 
 
 def _continues_smoothly(calls: LoopCalls, q: Array, speeds: Array, level: Array) -> bool:
-    """True if speeds without velocity errors lead to closed states.
+    """True if the projected `speeds` lead to closed states.
 
     Rows with pivots below `level` are ignored.  False where motions branch.
     """
@@ -262,9 +261,9 @@ def _continues_smoothly(calls: LoopCalls, q: Array, speeds: Array, level: Array)
 def _move_along(
     calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array
 ) -> Array | None:
-    """Move q (nq,) by `way` (rad, m) along speeds projected on the rows with pivots above `level`.
+    """Move q (nq,) by `way` (rad, m) along projected speeds.
 
-    None if no such speeds remain.
+    Only rows with pivots above `level` are satisfied.  None if no speeds remain.
     """
     for row, floor in enumerate(level.tolist()):
         calls.records.judge(row, floor)
@@ -280,9 +279,9 @@ def _move_along(
 def _close(
     calls: LoopCalls, near: Array, settled: float, left: Collection[int] = ()
 ) -> Array | None:
-    """Closed state (nq,) near a given one, to `settled` (rad, m), or None.
+    """Closed state (nq,) near a given one, to an accuracy of `settled` (rad, m), or None.
 
-    It satisfies all rows except those in `left`, redundant rows too.
+    It satisfies all rows except those in `left`, including redundant rows.
     """
     zero_speeds, compliance = np.zeros(calls.engine.nu), _INITIAL_COMPLIANCE
     for row in range(calls.count):

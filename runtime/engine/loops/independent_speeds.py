@@ -1,8 +1,8 @@
-"""Independent speeds of closed loops, and the speeds that they determine.
+"""Independent speeds of closed loops, and the dependent speeds as functions of them.
 
 Random speeds, each projected on the constraints by one correction, span the motions of a mechanism.
-Independent speeds v are chosen that distinguish these motions, preferably the first in the scene,
-and u = N v: N is 1 in the rows of v, and no row has a velocity error.
+Independent speeds v are chosen that distinguish these motions, preferably the first in the scene.
+Then u = N v, where N is the identity in the rows of v, and no constraint has a velocity error.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..looped_engine import LoopedEngine
 from .constraint_rank import geometric_loop_calls
 from .loop_analysis import LoopStart
 
-#: Motions that are rounding compared with others, in characteristic scales of the speeds.
+#: Relative size of motions that counts as rounding, in characteristic scales of the speeds.
 _MOTION_ROUNDING = 1e-9
 #: A speed is chosen if no other one distinguishes motions better by more than this factor.
 _SELECTION_RATIO = 4.0
@@ -29,7 +29,7 @@ _SELECTION_RATIO = 4.0
 _MAX_RATIO = 1e4
 #: Position gaps (m, rad) above which loops are open.
 _MAX_GAP = 1e-6
-#: Speeds determine no others if these would be more than this many times larger.
+#: Condition number above which speeds do not determine the others.
 _MAX_CONDITION = 1e8
 
 
@@ -51,7 +51,7 @@ class IndependentSpeeds:
 
     @cached_property
     def places(self) -> tuple[int, ...]:
-        """Indices of the independent speeds, which are chosen at the start."""
+        """Indices of the independent speeds, chosen at the initial state."""
         return self.chosen(self._start)
 
     def chosen(self, q: Array) -> tuple[int, ...]:
@@ -69,8 +69,8 @@ class IndependentSpeeds:
         """Choose speeds that fix a mechanism at q while `shapes` settle.
 
         Returns the indices of the fixed speeds, and of the shapes that then determine all others.
-        Fixed are `kept`, as far as they can move, and the first speeds that distinguish the motions
-        without change of shape, preferably those in `wished`.
+        The fixed speeds are those in `kept` that can move, and the first speeds that distinguish
+        the motions without change of shape, preferably those in `wished`.
         """
         remaining = self._motions(q) / self.sizes[:, None]
         fixed, remaining = select_rows(remaining, kept, _MAX_RATIO)
@@ -87,7 +87,7 @@ class IndependentSpeeds:
         )
 
     def following(self, q: Array, places: Sequence[int]) -> Array:
-        """Matrix N (nu, n): all speeds for a unit of each of some independent ones.
+        """Matrix N (nu, n) of u = N v for the independent speeds v at the indices `places`.
 
         Raises NumericalFailure if these do not determine the others, as at a dead centre, and in
         singular poses.
@@ -120,7 +120,7 @@ class IndependentSpeeds:
             )
 
     def driving(self, q: Array, speed: int) -> Array:
-        """All speeds (nu,) for a unit of one prescribed speed with the other prescribed ones zero.
+        """All speeds (nu,) for a unit of one prescribed speed, with the other prescribed ones zero.
 
         nan if the loops do not permit that motion.
         """
@@ -133,7 +133,7 @@ class IndependentSpeeds:
         )
 
     def moved(self, q: Array, speeds: Array) -> Array:
-        """Move q (nq,) slightly along speeds (nu,); loops are closed to first order."""
+        """Move q (nq,) by a small step along speeds (nu,); loops close to first order."""
         return self._calls.moved(q, speeds)
 
     @property
@@ -143,7 +143,7 @@ class IndependentSpeeds:
 
     @cached_property
     def rows_of_speeds(self) -> frozenset[int]:
-        """Rows that constrain speeds but no positions: of rolling discs, couplings of speeds."""
+        """Rows that constrain only speeds: of rolling discs and of couplings of speeds."""
         records = self._calls.records
         speed_directions = {
             closure.frame: closure.of_speeds
@@ -162,12 +162,12 @@ class IndependentSpeeds:
         return np.asarray(u + self._calls.correction(self._calls.slip, q, u)[0])
 
     def slip(self, q: Array, u: Array) -> Array:
-        """Velocity errors (rows,): J(q) u up to its sign."""
+        """Velocity errors (rows,): J(q) u up to sign."""
         return self._slips(q, u)[1]
 
     def _motions(self, q: Array) -> Array:
         """Basis (nu, n) of the motions at q, orthonormal in characteristic scales."""
-        count = min(len(self._free), self._loops.mobility + 1)  # one more shows at a singular pose
+        count = min(len(self._free), self._loops.mobility + 1)  # one more to detect a singular pose
         random_generator = np.random.default_rng(0)
         trials = np.zeros((count, len(self.sizes)))
         trials[:, self._free] = random_generator.standard_normal((count, len(self._free)))
@@ -182,9 +182,9 @@ class IndependentSpeeds:
         return speeds + self._slips(q, speeds)[0]
 
     def _slips(self, q: Array, speeds: Array) -> tuple[Array, Array]:
-        """Correction (nu,) of speeds and their velocity errors (rows,), without those at rest.
+        """Correction (nu,) of speeds and velocity errors (rows,), without those at rest.
 
-        At rest the velocity errors are those of couplings that depend on time.
+        At rest the velocity errors are those of time-dependent couplings.
         """
         correction, errors = self._calls.correction(self._calls.slip, q, speeds)
         rest_correction, rest_errors = self._calls.correction(
@@ -198,8 +198,8 @@ def select_rows(
 ) -> tuple[list[int], Array]:
     """Choose rows that distinguish motions (nu, n), orthonormal in characteristic scales.
 
-    Each is the first of `places` that distinguishes the remaining motions well enough.  Also
-    returns the motions in which none of the chosen rows moves.
+    Each row is the first of `places` that distinguishes the remaining motions at least 1 / `well`
+    times as well as any other.  Also returns the motions in which no chosen row moves.
     """
     candidates, selected = list(places), list[int]()
     for _ in range(left.shape[1]):
@@ -212,6 +212,6 @@ def select_rows(
 
 
 def _motions_without(left: Array, place: int) -> Array:
-    """Motions (nu, n) without their part that moves one speed."""
+    """Motions (nu, n) without the component that changes one speed."""
     direction = left[place] / np.linalg.norm(left[place])
     return np.asarray(left - np.outer(left @ direction, direction))

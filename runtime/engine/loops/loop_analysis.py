@@ -1,4 +1,4 @@
-"""Closed loops of a model: assembly at the start, rank of the rows, and their description."""
+"""Closed-loop analysis of a model: initial assembly, rank of the rows, and description."""
 
 from __future__ import annotations
 
@@ -42,12 +42,11 @@ _CONSTRAINT_ROWS = {
     "distance": ("length",), "plane": ("normal",), "rolling": ("x", "y", "normal"),
     "hinge": ("", "across1", "across2"),
 }  # fmt: skip
-#: Largest position gap of a row that may still be redundant up to a misfit, relative to the length
-#: of the scene.
+#: Largest position gap of a row that is redundant up to a misfit, relative to the scene length.
 _MAX_MISFIT = 1e-2
-#: Misfits of redundant rows that are rounding, relative to those that lock.
+#: Misfit of redundant rows that counts as rounding, relative to one that locks.
 NEGLIGIBLE_MISFIT = 1e-3
-#: A pose is near a singular one if the strain is this many times that of the start.
+#: Ratio of the strain to that of the start above which a pose is near a singular one.
 _SINGULAR_STRAIN_RATIO = 10.0
 #: Longest step (rad, m) along a branch.
 _MAX_BRANCH_STEP = 0.1
@@ -60,21 +59,21 @@ class LoopAnalysis:
     """Closed-loop analysis of a scene: cut hinges, rows, rank, redundancy and mobility.
 
     Attributes:
-        cut: hinges that close loops; the choice of a loop's hinge affects only the computing time.
+        cut: hinges that close loops; the choice within a loop affects only the computing time.
         rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
             for the outboard axis of the hinge nearest to its direction, "u1", ... for its own
             speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
             "across1" and "across2" of a curve.
         rank: number of independent rows.
-        nearby: that number in closed states nearby; greater than `rank` in a singular pose.
-        redundant: redundant rows, so that the loads along them are not determined.
-        momentary: those of them that are redundant only in this pose.
-        not_unique: components of the loads of hinges, "fx" to "mz" along and about their outboard
-            axes, and directions of the loads of constraints and couplings, by name, that rigid
-            bodies do not determine: results show one of many distributions.
-        misfit: the largest position gap (m, rad) at the start of rows that are redundant up to a
+        nearby: rank in closed states nearby; greater than `rank` in a singular pose.
+        redundant: redundant rows; the loads along them are indeterminate.
+        momentary: rows of `redundant` that are redundant only in this pose.
+        not_unique: indeterminate loads by name: components of hinge loads, "fx" to "mz" along and
+            about the outboard axes, and directions of the loads of constraints and couplings.
+            Rigid bodies do not determine them: results show one of many distributions.
+        misfit: largest position gap (m, rad) at the start of rows that are redundant up to a
             misfit, with the row; 0 and two empty strings if there is none.
-        mobility: number of free speeds.
+        mobility: number of degrees of freedom.
         shapes: number of these that are rates of the shapes of flexible bodies: all of them unless
             some are needed to satisfy rows.
         width: largest number of rows that are open across one hinge at a time.
@@ -96,7 +95,7 @@ class LoopAnalysis:
 
     @property
     def singular(self) -> bool:
-        """True if the start is a singular pose, with fewer independent rows than nearby."""
+        """True if the start is a singular configuration, with lower rank than states nearby."""
         return self.nearby > self.rank
 
     @property
@@ -107,13 +106,13 @@ class LoopAnalysis:
         return f"{self.rank} of {len(self.rows)} rows count, {speeds_text} left{shapes_text}"
 
     def repeated(self, most: int) -> str:
-        """List of `redundant` for messages, with at most `most` names."""
+        """Text of `redundant` for messages, with at most `most` names."""
         row_names = ", ".join(f"{word} of {name}" for name, word in self.redundant[:most])
         return row_names + (" ..." if len(self.redundant) > most else "")
 
     @property
     def open_loads(self) -> str:
-        """List of `not_unique` for messages, with the first names."""
+        """Text of `not_unique` for messages, with the first names only."""
         names_by_components: dict[tuple[str, ...], list[str]] = {}
         for name, components in self.not_unique.items():
             names_by_components.setdefault(components, []).append(name)
@@ -125,7 +124,7 @@ class LoopAnalysis:
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """Branches on which the loops close with coordinates of `hold` kept, as far as found.
+        """Assembly branches found that keep the coordinates of hinges with `hold`.
 
         The first is nearest to the start and is that of the model.
         """
@@ -133,7 +132,7 @@ class LoopAnalysis:
 
     @property
     def independent(self) -> tuple[str, ...]:
-        """Names of the independent speeds, as many as the mobility.
+        """Names of the independent speeds; their number is the mobility.
 
         They determine all others; mass matrices and linear models of the mechanism refer to them.
         """
@@ -141,9 +140,9 @@ class LoopAnalysis:
 
 
 class LoopStart:
-    """Start of a scene with closed loops, and their analysis.
+    """Initial state of a scene with closed loops, and their analysis.
 
-    `engine` is the engine to use from then on, without the rows that are always redundant.
+    `engine` is the engine for all further use, without the rows that are always redundant.
     """
 
     def __init__(self, engine: LoopedEngine, free_speeds: int) -> None:
@@ -152,7 +151,7 @@ class LoopStart:
         self._found: tuple[Branch, ...] = ()
         hinges = [hinge for hinge in packed.described.hinge if not hinge.is_weld]
         held_hinges = [hinge.name for hinge in hinges if hinge.hold]
-        #: Hinges whose start speeds are kept.
+        #: Hinges with initial speeds that are kept.
         self.fast = [
             hinge.name for hinge in hinges
             if hinge.drive is None and hinge.initial is not None and any(hinge.initial.u or ())
@@ -169,7 +168,7 @@ class LoopStart:
         near_q = self._nearest(q, near_q, held_hinges, _MAX_MISFIT * length)
         try:
             self._begin(near_q, u, held_hinges, free_speeds, calls)
-        except LoopClosureError:  # the gap there is no misfit: it closes farther away
+        except LoopClosureError:  # the gap is not a misfit: it closes farther away
             near_q = self._assembly(near_q, held_hinges).positions(
                 near_q, _MAX_MISFIT * length, rough=False
             )
@@ -181,10 +180,10 @@ class LoopStart:
     def _begin(
         self, near: Array, u: Array, holds: Collection[str], free_speeds: int, calls: LoopCalls
     ) -> None:
-        """Find the rank of the rows near a state (nq,) that is closed up to misfits; start there.
+        """Find the rank of the rows at `near` (nq,), which is closed up to misfits; start there.
 
-        `calls` are those of all rows.  Raises OpenLoop if independent rows do not close, SceneError
-        if the mechanism cannot move.
+        `calls` are those of all rows.  Raises LoopClosureError if independent rows do not close,
+        SceneError if the mechanism cannot move.
         """
         locking_gap = LOCKED * characteristic_length(self.engine.packed.system)
         self._keep(near)
@@ -204,7 +203,7 @@ class LoopStart:
         self._refuse_locked(calls, redundant_names, locking_gap)
 
     def _nearest(self, q: Array, near: Array, holds: Collection[str], much: float) -> Array:
-        """Return `near`, to which steps from the start q (nq,) lead, or a nearer branch's state."""
+        """State `near`, reached from the start q (nq,), or a state on a nearer branch."""
         self._wishes = RequestedCoordinates(self.engine.packed, q, holds)
         search = BranchSearch(self._assembly(q, holds), self._wishes, near, much)
         if search.is_near():
@@ -215,7 +214,7 @@ class LoopStart:
 
     @property
     def branches(self) -> tuple[Branch, ...]:
-        """Branches on which the loops close, as far as found, the nearest to the start first.
+        """Assembly branches found, the nearest to the start first.
 
         If the start was closed, the search happens at the first access.
         """
@@ -230,7 +229,7 @@ class LoopStart:
     def nearest(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float
     ) -> tuple[Array, Array]:
-        """Assemble as `assembled`, on that of the branches found that is nearest to q."""
+        """Assemble like `assembled`, on the branch nearest to q of those found."""
         assembly = self._assembly(q, holds, t)
         near_q = assembly.positions(q)
         search = BranchSearch(
@@ -242,8 +241,8 @@ class LoopStart:
     def led(self, q: Array, to: Array, holds: Collection[str], t: float = 0.0) -> Array:
         """Move the coordinates of `holds` from a closed q (nq,) to those of `to` on one branch.
 
-        The steps are small, so that the state stays on its branch; drives and couplings have their
-        values at t (s).  Raises OpenLoop if the branch ends before.
+        Small steps keep the state on its branch; drives and couplings have their values at t (s).
+        Raises LoopClosureError if the branch ends before.
         """
         layout, is_kept = self.engine.packed.layout, np.zeros(len(q), bool)
         driven = {hinge.name for hinge in self.engine.packed.described.hinge if hinge.drive}
@@ -262,7 +261,7 @@ class LoopStart:
         """Nearest (q, u) that satisfies all constraints at t (s).
 
         The coordinates of `holds` and the speeds of `fast` are kept.  Raises SceneError if there is
-        none.
+        no such state.
         """
         q = self._assembly(q, holds, t).positions(q)
         return q, self._assembly(q, fast, t).speeds(q, u)
@@ -271,11 +270,11 @@ class LoopStart:
         return RotorAssembly(self.engine, q, hinges, self._sharing, t)
 
     def _sharing(self, q: Array) -> str:
-        """End of a message about drives of the same degree of freedom near q, or ""."""
+        """Message part about drives of the same degree of freedom near q, or ""."""
         return shared_drives_text(self._whole, q)
 
     def _keep(self, q: Array) -> None:
-        """Give couplings without a value the one that they have at q."""
+        """Set the value of couplings without one to that at q."""
         packed = self.engine.packed
         if any(coupling.kept is None for coupling in packed.system.couplings):
             values = LoopCalls(self.engine, q).values()
@@ -286,7 +285,7 @@ class LoopStart:
     def _judged(
         self, q: Array, free_speeds: int
     ) -> tuple[LoopAnalysis, dict[int, tuple[str, str]]]:
-        """Analyse the loops near q; also the rows that are always redundant, by index."""
+        """Analyse the loops near q; also return the rows that are always redundant, by index."""
         rank, calls = find_rank(self.engine, q), LoopCalls(self.engine, q)
         packed, records = self.engine.packed, calls.records
         names, load_names = self._names(calls), dict(rank.open.loads)
@@ -323,7 +322,7 @@ class LoopStart:
         mobility = free_speeds - self._shared() - independent_count
         modal_speed_count = sum(slots.nu for slots in packed.layout.modal.values())
         if packed.releases:
-            # Rows redundant now may be needed after a release: every evaluation decides.
+            # Rows redundant now may be needed after a release: decide at every evaluation.
             for row in rank.going:
                 records.judge(row, REDUNDANT_PIVOT * float(calls.mobility[row]))
         elif rank.always:
@@ -350,13 +349,13 @@ class LoopStart:
         return analysis, {row: names[row] for row in sorted(rank.always)}
 
     def _too_many(self, q: Array, holds: Sequence[str], free_speeds: int) -> str:
-        """End of a message if more coordinates are held than are free near q, else ""."""
+        """Message part if `holds` fix more coordinates than the mobility near q, else ""."""
         count = sum(self.engine.packed.layout.hinges[name].nu for name in holds)
         try:
             near_q = Assembly(self.engine, q).positions(q)
             self._keep(near_q)
             mobility = self._judged(near_q, free_speeds)[0].mobility
-        except MstmmError:  # it does not close without held coordinates either
+        except MstmmError:  # it does not close without fixed coordinates either
             return ""
         if count <= mobility:
             return ""
@@ -366,7 +365,7 @@ class LoopStart:
         )
 
     def _refuse_structure(self) -> None:
-        """Raise SceneError if no motion is free and none is prescribed over time."""
+        """Raise SceneError if the mechanism has no mobility and no prescribed motion."""
         if self.loops.mobility > 0 or self._is_led:
             return
         remedy = find_skewed_axis(self.engine.packed, MIN_COUNTING_ANGLE)
@@ -377,7 +376,7 @@ class LoopStart:
         )
 
     def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
-        """Raise NumericalFailure for independent rows that the masses hide in rounding."""
+        """Raise NumericalFailure for independent rows lost to rounding because of the masses."""
         if rows:
             name, direction = rows[0]
             raise NumericalFailure(
@@ -387,7 +386,7 @@ class LoopStart:
 
     @property
     def _is_led(self) -> bool:
-        """True if drives, couplings that depend on time, or releases may move the mechanism."""
+        """True if drives, time-dependent couplings or releases may move the mechanism."""
         packed = self.engine.packed
         is_driven = any(coupling.goes_by_time for coupling in packed.described.coupling)
         return is_driven or bool(packed.system.driven or packed.releases)
@@ -395,7 +394,7 @@ class LoopStart:
     def _refuse_locked(
         self, calls: LoopCalls, repeating: Mapping[int, tuple[str, str]], much: float
     ) -> None:
-        """Raise SceneError if a redundant row leaves a gap that the others do not close."""
+        """Raise SceneError if a redundant row has a gap that the other rows do not close."""
         q, u = self.start
         gaps = np.abs(calls.correction(calls.gap, q, np.zeros(len(u)))[1])
         velocity_errors = np.abs(calls.correction(calls.slip, q, u)[1])
@@ -418,13 +417,13 @@ class LoopStart:
                 )
 
     def _locking(self, gap: float) -> str:
-        """End of a message about a gap (m, rad) that no motion closes, with a remedy."""
+        """Message part about a gap (m, rad) that no motion closes, with a remedy."""
         remedy = find_skewed_axis_by_gap(self.engine.packed, gap)
         remedy = remedy or "make axes parallel and points meet, or use a ball or cylindrical hinge"
         return f"as a rigid mechanism it would lock; {remedy}"
 
     def _shared(self) -> int:
-        """Number of free speeds of cut hinges, which the tree counts already."""
+        """Number of free speeds of cut hinges, already counted in the tree."""
         system = self.engine.packed.system
         frames = [system.body(closure.frame) for closure in system.closures]
         return sum(frame.nu - sum(frame.imposed) for frame in frames)
@@ -459,7 +458,7 @@ class LoopStart:
 
 
 def _independent_counts(records: LoopRecords, rank: Rank) -> dict[int, int]:
-    """Number of independent rows of closures with interchangeable rows, by place of the frame."""
+    """Number of independent rows of closures with interchangeable rows, by frame index."""
     rows_by_frame = {closure.frame: {*closure.rows.values()} for closure in records.closures}
     interchangeable_rows = rank.always - rank.going
     return {
@@ -471,13 +470,13 @@ def _independent_counts(records: LoopRecords, rank: Rank) -> dict[int, int]:
 def _open_loop_cause(engine: LoopedEngine, q: Array) -> str:
     """Cause of loops that close at the start q (nq,) but not later, with a remedy.
 
-    Empty if neither drives nor axes are the cause.
+    Empty if neither drives nor hinge axes are the cause.
     """
     return shared_drives_text(engine, q) or find_skewed_axis(engine.packed, MIN_COUNTING_ANGLE)
 
 
 def _closing_elements_text(closing: Iterable[str]) -> str:
-    """Phrase that names the elements that close loops, the first ones only."""
+    """Phrase that names the first of the elements that close loops."""
     names = [f'"{name}"' for name in dict.fromkeys(closing)]
     return (
         f"loops close at {', '.join(names[:_MAX_NAMES])}{' ...' if len(names) > _MAX_NAMES else ''}"
@@ -485,7 +484,7 @@ def _closing_elements_text(closing: Iterable[str]) -> str:
 
 
 def _distinct_directions(sizes: Array) -> list[str]:
-    """Distinct names of n directions (n, 6); the largest components choose first."""
+    """Distinct names of n directions (n, 6), assigned in descending order of components."""
     direction_names, remaining = [""] * len(sizes), sizes.copy()
     for _ in direction_names:
         row, column = np.unravel_index(remaining.argmax(), remaining.shape)

@@ -1,4 +1,4 @@
-"""Calls of the looped engine about closed loops."""
+"""Calls of the looped engine for closed loops."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..looped_engine import LoopedEngine
 from .constraint_mobility import row_mobilities
 from .loop_workspace import LoopWorkspace
 
-#: A pivot below this fraction of its reference is rounding; the reference is the mobility of its
+#: Fraction of its reference below which a pivot is rounding.  The reference is the mobility of the
 #: row, except for rows with pivots below the second fraction of it because of heavy bodies.
 PIVOT_ROUNDING, _HEAVY_BODY_RATIO = 1e-8, 1e-3
-#: A row with a pivot below this fraction of its mobility is redundant: misfits up to 4e-3 rad.
+#: Fraction of its mobility below which a pivot is that of a redundant row: misfits up to 4e-3 rad.
 REDUNDANT_PIVOT = 1e-6
 #: Fractions of the mobility below which a reference, and any pivot, count as zero.
 _MIN_REFERENCE, _MIN_PIVOT = 1e-12, 1e-15
@@ -25,9 +25,9 @@ _MIN_REFERENCE, _MIN_PIVOT = 1e-12, 1e-15
 class LoopCalls(LoopWorkspace):
     """Position gaps and velocity errors of the loops of one packed scene, and their corrections.
 
-    The reference for the pivot of every row is the mobility of its ends at `q` (nq,) as if free;
-    `mobility` (rows,) replaces it if these ends have no mass.  Drives and couplings have their
-    values at `t` (s), unless another time is given.
+    The reference for the pivot of every row is the mobility of its ends at `q` (nq,) as free
+    bodies; `mobility` (rows,) replaces it if these ends have no mass.  Drives and couplings have
+    their values at `t` (s), unless another time is given.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class LoopCalls(LoopWorkspace):
     def correction(
         self, level: int, q: Array, u: Array, give: float = 0.0, t: float | None = None
     ) -> tuple[Array, Array]:
-        """Correction along the speeds (nu,) and errors of the rows (rows,); see sweep.h."""
+        """Correction along the speeds (nu,) and row errors (rows,); see sweep.h."""
         engine, t = self.engine, self.t if t is None else t
         change, errors = np.zeros(engine.nu), np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
@@ -70,9 +70,9 @@ class LoopCalls(LoopWorkspace):
         return change, errors[: self.count]
 
     def choose(self, q: Array) -> bool:
-        """Choose which of interchangeable redundant rows are satisfied; True for a new choice.
+        """Choose among interchangeable redundant rows; True for a new choice.
 
-        A previous choice is kept while it is not much worse than the best at q (nq,).
+        The previous choice is kept unless it is much worse than the best one at q (nq,).
         """
         engine = self.engine
         is_changed, failure = engine.ffi.new("int *"), engine.ffi.new("mstmm_failure *")
@@ -85,7 +85,7 @@ class LoopCalls(LoopWorkspace):
         return bool(is_changed[0])
 
     def resting(self) -> NDArray[np.bool_]:
-        """Mask (rows,) of the rows not satisfied because others of their choice are."""
+        """Mask (rows,) of rows that are not chosen: interchangeable ones are used instead."""
         return self.records.resting(self.memory)
 
     def let_go(self) -> list[int]:
@@ -119,7 +119,7 @@ class LoopCalls(LoopWorkspace):
         return q_moved
 
     def driven(self, q: Array, u: Array) -> tuple[Array, Array]:
-        """State (q, u) with the driven coordinates and speeds set."""
+        """State (q, u) with driven coordinates and speeds set to their prescribed values."""
         engine, q, u, t = self.engine, q.copy(), u.copy(), self.t
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_fill_driven(
@@ -131,10 +131,11 @@ class LoopCalls(LoopWorkspace):
         return q, u
 
     def judge_by(self, states: Sequence[Array]) -> set[int]:
-        """Set the reference of pivots far below their mobilities from closed states (nq,).
+        """Set the reference for pivots far below their mobilities from closed states (nq,).
 
         Such rows are independent, with heavy bodies outboard of them; their reference is the
-        largest pivot at these states.  Returns the rows whose pivots are rounding at all states.
+        largest pivot at these states.  Returns the rows with pivots at rounding level in all
+        states.
         """
         floors = [self.records.floor(row) for row in range(self.count)]
         for row in range(self.count):
@@ -154,6 +155,6 @@ class LoopCalls(LoopWorkspace):
         }
 
     def strain(self, q: Array) -> float:
-        """Largest ratio of a row's rounding level to its pivot, at a closed state."""
+        """Largest ratio of rounding level to pivot over all rows, at a closed state."""
         self.correction(self.slip, q, np.zeros(self.engine.nu))
         return float((self.inverses() * self.records.floors).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Results of the last correction of closed loops in the workspace."""
+"""Workspace results of the last correction of closed loops."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..looped_engine import LoopedEngine
 
 
 class LoopWorkspace:
-    """Access to the workspace of rows, closures and couplings of one packed scene."""
+    """Workspace of rows, closures and couplings of one packed scene."""
 
     def __init__(self, engine: LoopedEngine) -> None:
         records = engine.packed.written.loops
@@ -19,7 +19,7 @@ class LoopWorkspace:
         self.count = records.count
 
     def closing(self, row: int) -> str:
-        """Name of the element to which a row belongs, for messages."""
+        """Label of the element to which a row belongs, for messages."""
         for closure in self.records.closures:
             if row in closure.rows.values():
                 return self.engine.closing(closure.frame)
@@ -33,7 +33,7 @@ class LoopWorkspace:
         return next(names, "")
 
     def inverses(self) -> Array:
-        """1 / pivot of every row in the last correction, 0 for rows without a multiplier."""
+        """Inverse pivots of the rows in the last correction, 0 for rows without a multiplier."""
         return self._of_rows("INVERSE")
 
     def pivots(self) -> Array:
@@ -46,13 +46,13 @@ class LoopWorkspace:
         return self.engine.workspace_array()[first : first + stride * self.count : stride].copy()
 
     def values(self) -> Array:
-        """Values of the couplings in the last correction of gaps."""
+        """Values of the couplings in the last gap correction."""
         first = self.records.place + int(self.engine.lib.MSTMM_COUPLING_GAP)
         indices = [first + coupling.numbers for coupling in self.records.couplings]
         return self.engine.workspace_array()[indices]
 
     def slopes_of(self, one: WrittenCoupling, place: int) -> Array:
-        """Derivatives -C (nu,) of a coupling on the speeds of one of its hinges.
+        """Derivatives -C (nu,) of a coupling with respect to the speeds of one of its hinges.
 
         Valid after a correction.
         """

@@ -1,6 +1,6 @@
-"""Loops of pin and prismatic hinges whose axes are parallel except for a small angle.
+"""Nearly parallel axes in loops of pin and prismatic hinges.
 
-Such a loop moves in a plane or not at all, so the angle is a mistake whatever its effect: the loop
+Such a loop moves in a plane or not at all, so the angle is a modelling error in any case: the loop
 locks, has no degree of freedom, or does not close.  Between two successive pins of a loop nothing
 rotates, so that the angles between their axes are those of the scene in every pose.
 """
@@ -21,16 +21,16 @@ from mstmm.scene.tables.scene_tables import SceneTables
 from ...packing.loops.system_variants import characteristic_length
 from ...packing.packed_scene import PackedScene
 
-#: Largest angle (rad) that counts as small, and the smallest one that may make rows independent
-#: that are redundant with parallel axes.
+#: Largest angle (rad) that counts as small, and the smallest angle at which rows that are redundant
+#: with parallel axes may become independent.
 _MAX_SMALL_ANGLE, MIN_COUNTING_ANGLE = 0.1, 1e-4
-#: Ratio of a gap (m, rad) to the angle that causes it, for lengths of 1 m; angles that are
+#: Ratio of a gap (m, rad) to the angle that causes it, for lengths of 1 m; angle that counts as
 #: rounding, rad.
 _GAP_PER_ANGLE, _ANGLE_ROUNDING = 4.0, 1e-9
-#: Number of hinges of a loop that moves in a plane.
+#: Minimum number of hinges in a loop with planar motion.
 _MIN_MOVING_HINGES = 4
-#: A hinge is off alone if the smaller angle to its neighbours exceeds the first fraction of the
-#: larger one, and all other angles are below the second.
+#: A single hinge is misaligned if the smaller angle to its neighbours exceeds the first fraction of
+#: the larger one, and all other angles are below the second.
 _MIN_NEIGHBOUR_RATIO, _MAX_OTHER_RATIO = 0.5, 0.1
 
 
@@ -38,7 +38,7 @@ _MIN_NEIGHBOUR_RATIO, _MAX_OTHER_RATIO = 0.5, 0.1
 class _Skew:
     """Angle (rad) between two hinge axes on one body that should be parallel.
 
-    For a prismatic hinge: the angle from the plane perpendicular to the adjacent pins.
+    For a prismatic hinge: angle to the plane perpendicular to the adjacent pins.
     """
 
     angle: float
@@ -47,16 +47,16 @@ class _Skew:
 
 
 def find_skewed_axis_by_gap(packed: PackedScene, gap: float) -> str:
-    """Find skewed axes as `find_skewed_axis` does, with angles that may cause a gap (m, rad)."""
+    """Result of `find_skewed_axis` for angles that are large enough to cause a gap (m, rad)."""
     return find_skewed_axis(
         packed, gap / (_GAP_PER_ANGLE * max(1.0, characteristic_length(packed.system)))
     )
 
 
 def find_skewed_axis(packed: PackedScene, least: float) -> str:
-    """End of a message that names an axis of a closed loop that is nearly parallel, with a remedy.
+    """Message part that names a nearly parallel axis of a closed loop, with a remedy.
 
-    Its angle is from `least` to 0.1 rad; empty if there is no such axis.
+    Its angle is between `least` and 0.1 rad; empty if there is no such axis.
     """
     scene, worst_skews = packed.described.skeleton, list[_Skew]()
     plan = build_topology(scene).plan
@@ -79,7 +79,7 @@ def _largest_angle(skews: list[_Skew]) -> float:
 def _loop_skews(scene: SceneTables, loop: list[Hinge]) -> list[_Skew]:
     """Angles between successive pins of a loop, or of its prismatic hinges if these are larger.
 
-    Empty if the loop contains other hinges, fewer than two pins, or too few hinges for a planar
+    Empty if the loop contains other hinges, fewer than two pins, or too few hinges for planar
     motion.
     """
     moving_count = sum(not hinge.is_weld for hinge in loop)
@@ -107,7 +107,7 @@ def _successive_pins(
 ) -> Iterator[tuple[tuple[Hinge, Hinge], tuple[Array, Array], str, list[tuple[Hinge, Array]]]]:
     """Successive pins of a loop, their axes in one frame, and prismatic hinges between them.
 
-    Also the body outboard of the first pin, and the axes of the prismatic hinges.
+    Also yields the body after the first pin, and the axes of the prismatic hinges.
     """
     pins = [k for k, hinge in enumerate(loop) if hinge.facts and hinge.facts.turns]
     body = split_reference(loop[0].inboard)[0]
@@ -132,7 +132,7 @@ def _successive_pins(
 
 
 def _hinge_axes(scene: SceneTables, hinge: Hinge, body: str) -> tuple[Array, Array, str]:
-    """Axes of a hinge at rest in the axes of `body` and of the other body, and that body's name."""
+    """Axes of a hinge at rest in those of `body` and of the other body, and the other's name."""
     inboard = _end_rotation(scene, hinge.inboard) @ np.array(hinge.rotation)
     outboard, other_body = _end_rotation(scene, hinge.outboard), split_reference(hinge.inboard)[0]
     if body == other_body:
@@ -151,7 +151,7 @@ def _line_angle(one: Array, other: Array) -> float:
     return math.atan2(float(np.linalg.norm(np.cross(one, other))), abs(float(one @ other)))
 
 
-# --- words ----------------------------------------------------------------------------------------
+# --- messages -------------------------------------------------------------------------------------
 
 
 def _skew_text(skews: list[_Skew]) -> str:

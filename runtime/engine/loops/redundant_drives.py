@@ -16,17 +16,18 @@ from .loop_calls import REDUNDANT_PIVOT
 
 #: Number of random motions in addition to the number of drives.
 _EXTRA_TRIALS = 2
-#: Relative motions that are rounding, and relative shares of a drive in a combination that count as
-#: none.
+#: Relative size of motions that counts as rounding, and share of a drive in a combination that
+#: counts as zero.
 _RELATIVE_ROUNDING, _MIN_SHARE = 1e-6, 1e-4
 #: Maximum number of drives named in a message.
 _MAX_NAMES = 8
 
 
 def shared_drives_text(engine: LoopedEngine, q: Array) -> str:
-    """End of a message that names drives of the same degree of freedom near q (nq,), with a remedy.
+    """Message part that names drives of the same degree of freedom near q (nq,), with a remedy.
 
-    Empty if each drive moves its own degree of freedom, or if loops stay open without drives too.
+    Empty if each drive moves its own degree of freedom, or if loops remain open even without
+    drives.
     """
     driven = engine.packed.system.driven
     if len(driven) < 2:

@@ -1,7 +1,7 @@
-"""Assembly of mechanisms of many bodies with the inertia of rotors if that of bodies fails.
+"""Assembly of mechanisms of many bodies with rotor inertia if it fails with body inertia.
 
-Steps of least change weighted by the inertia of bodies rotate the last links of a long chain most,
-so that it folds up; with equal rotors on all hinges it bends as a whole.
+Steps of least change weighted by body inertia rotate the last links of a long chain most, so that
+it folds up; with equal rotors on all hinges it bends as a whole.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ...packing.scene_packing import packed_system
 from ..looped_engine import LoopedEngine
 from .assembly import Assembly
 
-#: Mechanisms with fewer speeds do not fold up.
+#: Minimum number of speeds: smaller mechanisms do not fold up.
 _MIN_SPEEDS = 20
 #: Random change (rad, m) of a pose with all links in line.
 _RANDOM_CHANGE = 1e-3
 
 
 class RotorAssembly(Assembly):
-    """Assembly that tries again with the inertia of rotors."""
+    """Assembly that tries again with rotor inertia."""
 
     def __init__(
         self, engine: LoopedEngine, q: Array, hinges: Collection[str] = (),
@@ -50,7 +50,7 @@ class RotorAssembly(Assembly):
             return super().positions(near_q, *more, **others)
 
     def _shaken(self, q: Array) -> Array:
-        """Change q slightly: with all links in line the direction of bending is undetermined."""
+        """Perturb q: with all links in line the direction of bending is undetermined."""
         change = _RANDOM_CHANGE * np.random.default_rng(0).uniform(-1.0, 1.0, self._engine.nu)
         return self.calls.moved(q, change * self.free)
 

@@ -1,9 +1,9 @@
-"""Loads that rigid bodies do not determine: self-stress states of closed loops.
+"""Indeterminate loads of rigid bodies: self-stress states of closed loops.
 
-Multipliers z of redundant rows may grow together without any motion: L z = 0.  Repeated solutions
-with compliant rows, (L + give f) x = give f y from a random y, converge to the part of y in this
-null space, at the cost of a sweep each.  A component of a hinge's load is unique if no self-stress
-state contains it.
+Combinations z of multipliers of redundant rows cause no motion: L z = 0.  Repeated solutions with
+compliant rows, (L + give f) x = give f y from a random y, converge to the part of y in this null
+space, at the cost of one sweep each.  A component of a hinge load is unique if no self-stress state
+contains it.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from .loop_calls import LoopCalls
 _COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 #: Compliance relative to the mobility, number of repetitions, and number of random states.
 _COMPLIANCE, _REPETITIONS, _RANDOM_STATES = 1e-7, 4, 2
-#: Components that are rounding: relative to the largest one, and as a multiple of the gaps (m, rad)
-#: that redundant rows leave, which falsify the states.
+#: Components that count as rounding: relative to the largest one, and as a multiple of the gaps (m,
+#: rad) of redundant rows, which falsify the states.
 _RELATIVE_ROUNDING, _GAP_FACTOR = 1e-5, 10.0
 
 _UPPER_TRIANGLE = np.triu_indices(6)
@@ -30,7 +30,7 @@ _UPPER_TRIANGLE = np.triu_indices(6)
 
 @dataclass(frozen=True)
 class IndeterminateLoads:
-    """Indeterminate loads: components of hinge loads by hinge name, and rows by index."""
+    """Indeterminate loads: components by hinge name, and rows by index."""
 
     loads: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     rows: frozenset[int] = frozenset()
@@ -39,7 +39,7 @@ class IndeterminateLoads:
 def find_indeterminate_loads(
     calls: LoopCalls, q: Array, silent: Collection[int] = ()
 ) -> IndeterminateLoads:
-    """Find the indeterminate loads at the closed q (nq,) without the rows in `silent`.
+    """Find the indeterminate loads at the closed q (nq,), without the rows in `silent`.
 
     `calls` are those of a geometry in which all rows are satisfied.
     """
@@ -63,7 +63,7 @@ def find_indeterminate_loads(
 
 
 def outboard_axes(calls: LoopCalls, place: int) -> Array:
-    """Outboard axes (3, 3) of the hinge at a place of the tree, in internal axes of its body."""
+    """Outboard axes (3, 3) of the hinge at a tree index, in internal axes of its body."""
     packed = calls.engine.packed
     hinge = packed.scene.hinges[packed.topology.at(place)[1]]
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
@@ -72,7 +72,7 @@ def outboard_axes(calls: LoopCalls, place: int) -> Array:
 def _loaded_components(
     calls: LoopCalls, q: Array, silent: Collection[int], seed: int, rounding: float
 ) -> tuple[Array, Array]:
-    """Masks of components (bodies, 6) and rows (rows,) that a random self-stress state loads."""
+    """Masks of components (bodies, 6) and rows (rows,) loaded by a random self-stress state."""
     for row in range(calls.count):
         calls.records.judge(row, np.inf if row in silent else 0.0)
     is_imposed = np.array(
@@ -92,7 +92,7 @@ def _loaded_components(
 
 
 def _load_sizes(calls: LoopCalls) -> Array:
-    """Absolute load components (bodies, 6) of every inboard hinge, in outboard axes."""
+    """Magnitudes of the load components (bodies, 6) of inboard hinges, in outboard axes."""
     packed = calls.engine.packed
     sizes = np.zeros((packed.system.count, 6))
     for place in range(len(sizes)):
