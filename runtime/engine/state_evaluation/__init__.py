@@ -1,1 +1,1 @@
-"""Evaluation at given states: accelerations, efforts, mass matrices, points; one or many."""
+"""Evaluation at single states and batches: accelerations, efforts, mass matrices, points."""

@@ -1,6 +1,6 @@
 """Points of a scene at given states: positions, motion, and Jacobians.
 
-Given coordinates and speeds are used unchanged, driven ones too; laws, loads and gravity are
+Given coordinates and speeds are used unchanged, including driven ones; laws, loads and gravity are
 omitted, so that no acceleration has to be determined.
 """
 
@@ -26,7 +26,7 @@ from ..looped_engine import LoopedEngine
 from ..observation_columns import POINT_COLUMNS
 from .single_state import is_small
 
-#: Columns of a probe: velocity and angular velocity, acceleration and angular acceleration.
+#: Columns of a probe: velocity and angular velocity; acceleration and angular acceleration.
 _VELOCITY_COLUMNS = [*range(3, 6), *range(9, 12)]
 _ACCELERATION_COLUMNS = [*range(6, 9), *range(12, 15)]
 _ANGULAR_VELOCITY_COLUMNS = POINT_COLUMNS["angular_velocity"]
@@ -35,22 +35,23 @@ _ANGULAR_VELOCITY_COLUMNS = POINT_COLUMNS["angular_velocity"]
 Names = str | Sequence[str]
 
 
-#: Kind of a call of `Kinematics.call` -> whether it needs u besides q, and its result for a point.
+#: Kind of a call of `Kinematics.call` -> whether it needs u in addition to q, and the result shape
+#: for one point.
 _CALL_SHAPES: dict[str, tuple[bool, tuple[int, ...]]] = {
     "places": (False, (3,)), "poses": (False, (4, 4)), "velocities": (True, (6,)),
     "jacobian": (False, (6,)), "jacobian_rate": (True, (6,)),
 }  # fmt: skip
 
 #: Entries (by, row, column, value) of the rotation of increments: the rate of `row` due to `column`
-#: is value times the speed `by`.
+#: is `value` times the speed `by`.
 Brackets = list[tuple[int, int, int, float]]
 
 
 class Kinematics:
-    """Kinematic calls on one packed scene.  Safe to call from several threads.
+    """Kinematic calls on one packed scene; thread-safe.
 
     Rows of states are arrays (n, nq), (n, nu).  `brackets` returns those of the increments, None if
-    they depend on the state.  Code of the scene is looked for when bodies are requested.
+    they depend on the state.  Requests for bodies trigger a search for code of the scene.
     """
 
     def __init__(
@@ -85,7 +86,7 @@ class Kinematics:
         return call
 
     def _sought(self, kind: str, key: Names) -> PreparedCall:
-        """Prepared call after a search for code at call numbers 1, 2, 4, 8, ..."""
+        """Prepared call; calls number 1, 2, 4, 8, ... search for code first."""
         request_count = self._asked[key] = self._asked.get(key, 0) + 1
         call = self._calls.get((kind, key))
         if call is None or request_count & (request_count - 1) == 0:
@@ -98,7 +99,7 @@ class Kinematics:
             )
             available = [code for code in codes if code is not None]
             is_complete = not needs_loops and len(available) == len(bodies)
-            if is_complete:  # prepare the calls that used loops again
+            if is_complete:  # prepare calls of the looped engine again
                 for other_kind in _CALL_SHAPES:
                     self._calls.pop((other_kind, key), None)
             if is_complete or needs_loops:
@@ -143,11 +144,11 @@ class Kinematics:
 
     @cached_property
     def _room(self) -> Any:
-        """Workspace shared by all of these calls, of which one runs at a time."""
+        """Workspace shared by all prepared calls, of which only one runs at a time."""
         return self._engine.pointer(np.zeros(self._engine.packed.workspace))
 
     def points(self, of: Names, q: Array, u: Array, udot: Array) -> Array:
-        """Motion (n, k, 24) of k bodies or ends, see `Observation`."""
+        """Motion (n, k, 24) of k bodies or ends; see `Observation`."""
         probes, count = self._probes(of)
         points_found = np.empty((len(q), count, self._numbers))
         pointers = (self._engine.pointer(array) for array in (q, u, udot))
@@ -166,7 +167,7 @@ class Kinematics:
         return self.points(of, q, u, np.zeros(u.shape))[..., _VELOCITY_COLUMNS]
 
     def jacobian(self, of: Names, q: Array) -> Array:
-        """Jacobian (k, 6, nu) of one state: derivative of `moving` with respect to speeds."""
+        """Jacobian (k, 6, nu) at one state: derivative of `moving` with respect to speeds."""
         if self._bends:
             return self._by_units(of, q)
         probes, count = self._probes(of)
@@ -181,7 +182,7 @@ class Kinematics:
         return jacobian_matrix
 
     def _by_units(self, of: Names, q: Array) -> Array:
-        """Jacobian (k, 6, nu) from unit speeds, rates of modes included."""
+        """Jacobian (k, 6, nu) from unit speeds, including modal rates."""
         nu = self._engine.nu
         q_rows, units = np.tile(q, (nu, 1)), np.eye(nu)
         return np.moveaxis(
@@ -191,10 +192,10 @@ class Kinematics:
     def jacobian_rate(self, of: Names, q: Array, u: Array, turning: Array | None) -> Array:
         """Rate (k, 6, nu) of `jacobian` along speeds u (nu,), at one state.
 
-        Accelerations at udot = 0 are quadratic in the speeds w; half of their change along u is the
-        part of J' that is symmetric in u and the column's speed.  The antisymmetric part is the
-        bracket of both: w x of the rotations, and J times that of the speeds, -`turning` (nu, nu;
-        None: zero), which is the rate of the increments.
+        Accelerations at udot = 0 are quadratic in the speeds; half of their derivative along u is
+        the part of J' that is symmetric in u and the speed of the column.  The antisymmetric part
+        is the bracket of both: the cross product of the angular velocities, and J times the bracket
+        of the speeds, -`turning` (nu, nu; None: zero), which is the rate of the increments.
         """
         nu = self._engine.nu
         size = max(1.0, float(np.abs(u).max(initial=0.0)))
@@ -209,7 +210,7 @@ class Kinematics:
         return rate if turning is None else rate - jacobian @ turning / 2
 
     def _probes(self, of: Names) -> tuple[Any, int]:
-        """C records of bodies and ends, cached; SceneError for an unknown name."""
+        """Cached C records of bodies and ends; raises SceneError for an unknown name."""
         key = of if isinstance(of, str) else tuple(of)
         record = self._records.get(key)
         if record is None:
@@ -243,7 +244,7 @@ class Kinematics:
 
 
 class _KinematicsRecord:
-    """C record of the general calls of one thread."""
+    """C record for the general calls of one thread."""
 
     __slots__ = ("_pointed", "failure", "record")
 
@@ -254,7 +255,7 @@ class _KinematicsRecord:
 
 
 class _FusedPointsRecord:
-    """C record of prepared calls with code of the scene."""
+    """C record for prepared calls with fused code."""
 
     def __init__(
         self,
@@ -276,7 +277,7 @@ class _FusedPointsRecord:
 
 
 class _LoopedPointsRecord:
-    """C record of prepared calls of the looped engine for fixed bodies or ends."""
+    """C record for prepared calls of the looped engine for given bodies or ends."""
 
     def __init__(
         self, engine: LoopedEngine, room: Any, probes: Any, count: int, brackets: Brackets
@@ -301,7 +302,7 @@ class _LoopedPointsRecord:
 
 
 def _fill_record(record: Any, engine: LoopedEngine, workspace: Any) -> list[Any]:
-    """Fill `mstmm_kinematics`; returns the memory to which it points."""
+    """Fill an `mstmm_kinematics` record; returns the memory to which it points."""
     arrays = engine.start_memory(), np.zeros(engine.nu), np.empty(engine.nu)
     pointers = [engine.pointer(array) for array in arrays]
     record.model, record.workspace = engine.packed.model, workspace

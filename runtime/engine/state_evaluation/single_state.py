@@ -1,4 +1,4 @@
-"""Fast calls for single states: everything that does not change is prepared once."""
+"""Fast calls for single states, with all constant data prepared in advance."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from ..fused_code import FusedCode
 from ..live_inputs import LiveInputs
 from ..looped_engine import LoopedEngine
 
-#: Calls on scenes with more bodies or speeds release Python's lock, with one record per thread, and
-#: have no prepared call of the mass matrix.
+#: Maximum number of bodies and of speeds of a small scene.  Calls on larger scenes release the
+#: interpreter lock, with one record per thread, and have no prepared call of the mass matrix.
 MAX_SIZE = 100
 
-#: Code of the scene: that of accelerations, that of inverse dynamics and the mass matrix.
+#: Fused code for accelerations, and for inverse dynamics and the mass matrix.
 Libraries = tuple[FusedLibrary | None, FusedLibrary | None]
 #: Calls of a record.
 _CALL_NAMES = ("accelerations", "efforts", "mass", "energy", "momentum", "moved")
 
 
 def is_small(engine: LoopedEngine) -> bool:
-    """True if calls are so short that Python's lock need not be released."""
+    """True if calls are so short that the interpreter lock need not be released."""
     return engine.packed.topology.count <= MAX_SIZE and engine.nu <= MAX_SIZE
 
 
 class SingleStateCalls:
-    """Calls on single states that are rows of doubles (nq,), (nu,).
+    """Calls on single states given as rows of doubles (nq,), (nu,); thread-safe.
 
-    They return None for other arguments and for any failure: the caller then uses the general call,
-    which evaluates the state or reports what is wrong.  Safe to call from several threads.
+    They return None for other arguments and for any failure; the caller then uses the general call,
+    which evaluates the state or reports the error.
 
     Attributes:
         accelerations: (t, q, u, efforts or None) -> udot (nu,).
@@ -41,7 +41,7 @@ class SingleStateCalls:
         mass: (q) -> (nu, nu), if no body is flexible.
         energy: (t, q, u) -> (); momentum: (t, q, u) -> (6,).
         moved: (dt, q, u) -> (nq,), if no body is flexible.
-        library, inverse: code of the scene in use; call `renew` if the fusion has other code.
+        library, inverse: fused code in use; call `renew` if the fusion has other code.
     """
 
     accelerations: PreparedCall
@@ -58,7 +58,7 @@ class SingleStateCalls:
         self.renew()
 
     def renew(self) -> None:
-        """Use the code that exists for the scene now."""
+        """Switch to the fused code that exists now."""
         libraries = self._fusion.library, self._fusion.inverse
         record = _Record(self._engine, self._fusion, libraries) if is_small(self._engine) else None
         for name in _CALL_NAMES:
@@ -66,7 +66,7 @@ class SingleStateCalls:
         self.library, self.inverse = libraries
 
     def seek(self) -> None:
-        """Look for code of inverse dynamics at call numbers 1, 2, 4, 8, ..."""
+        """Search for code of inverse dynamics at calls number 1, 2, 4, 8, ..."""
         fusion = self._fusion
         if fusion.inverse is None:
             self._asked += 1
@@ -84,7 +84,7 @@ class SingleStateCalls:
         return call
 
     def _made(self) -> _Record:
-        """Record of this thread, created again when there is new code of the scene."""
+        """Record of this thread, recreated when there is new fused code."""
         libraries = self.library, self.inverse
         record: _Record | None = getattr(self._local, "made", None)
         if record is None or record.by != libraries:
@@ -95,8 +95,7 @@ class SingleStateCalls:
 
 
 class _Record:
-    """Prepared calls of `SingleStateCalls` with their memory; `by` is the code of the scene that
-    they use."""
+    """Prepared calls of `SingleStateCalls` with their memory; `by` is their fused code."""
 
     def __init__(
         self, engine: LoopedEngine, fusion: FusedCode, by: Libraries, released: bool = False
@@ -113,7 +112,7 @@ class _Record:
         record.p, record.memory, record.none, record.qdot, record.work = self._pointed
         if released:
             record.workspace = engine.workspace()
-        else:  # the thread's own workspace is used by other calls
+        else:  # other calls use the workspace of the thread
             self._point("workspace", "real[]", np.zeros(engine.packed.workspace))
         record.fused, record.inverse = (
             ffi.NULL if library is None else library.descriptor for library in self.by

@@ -1,8 +1,7 @@
-"""Accelerations of many states: in SIMD lanes with fused code, and in threads.
+"""Accelerations of a batch of states, in SIMD lanes with fused code and in threads.
 
-The result of a state does not depend on the other states, on their number or on the number of
-threads: every state of a batch is evaluated by the same code.  C runs without the interpreter's
-lock.
+The result of a state does not depend on the other states, their number or the number of threads:
+the same code evaluates every state of a batch.  C code runs without the interpreter lock.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from ..fused_code import FusedCode
 from ..live_inputs import LiveInputs
 from ..looped_engine import LoopedEngine
 
-#: Smallest work for which a thread is started, about 0.2 ms, in states times speeds.
+#: Smallest work that justifies a thread, about 0.2 ms, in states times speeds.
 _MIN_WORK_LANES, _MIN_WORK_LOOPED = 20000, 2000
 
 
@@ -43,7 +42,7 @@ class StateBatch:
 
 @dataclass(frozen=True)
 class FailedState:
-    """First state of a range that could not be evaluated."""
+    """First state of a range with a failed evaluation."""
 
     index: int
     failure: Any
@@ -62,8 +61,8 @@ def accelerations(
     """Compute udot (n, nu) of a batch with at most `threads` threads (None: one per processor).
 
     One state (no leading axis) uses the scalar code, others the lanes.  Raises SceneError for an
-    invalid number of threads; NumericalFailure or UndeterminedMotion that names the state and the
-    hinge.
+    invalid number of threads, and NumericalFailure or UndeterminedMotionError, which name the state
+    and the hinge.
     """
     n, udot = len(states.q), np.empty((len(states.q), engine.nu))
     live = LiveInputs(engine.packed.system, fusing.inputs)
@@ -96,7 +95,7 @@ def accelerations(
 def run_in_threads(
     run: Callable[[int, int], FailedState | None], n: int, step: int, smallest: int, threads: int
 ) -> FailedState | None:
-    """Call run(first, end) over 0..n in ranges that begin at multiples of `step`.
+    """Call run(first, end) in threads over ranges of 0..n that begin at multiples of `step`.
 
     Only the last range may be shorter than `smallest`.  Returns the failure of the lowest index.
     """
@@ -157,7 +156,7 @@ def _failure_record(engine: LoopedEngine, library: FusedLibrary, code: int) -> A
 def _looped_evaluation(
     engine: LoopedEngine, states: StateBatch, udot: Array
 ) -> Callable[[int, int], FailedState | None]:
-    """Evaluation of a range by the looped engine; every thread has a workspace."""
+    """Evaluation of a range by the looped engine; every thread has its own workspace."""
     memory = np.tile(engine.start_memory(), (len(states.q), 1))
 
     def run(first: int, end: int) -> FailedState | None:
@@ -183,7 +182,7 @@ def _state_error(engine: LoopedEngine, states: StateBatch, failed: FailedState) 
 
 
 def _state_prefix(lead: tuple[int, ...], index: int) -> str:
-    """Prefix of a message with the index of a state on the leading axes; "" for one state."""
+    """Message prefix with the index of a state on the leading axes; "" for one state."""
     if not lead:
         return ""
     indices = [int(k) for k in np.unravel_index(index, lead)]

@@ -1,4 +1,4 @@
-"""Motion of coordinates with constant rates."""
+"""Motion of coordinates at constant rates."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from mstmm.array_validation import Array
 
 
 def move_steadily(q: Array, rates: Array, dt: float, quaternions: Iterable[int]) -> Array:
-    """Move q (nq,) by dt (s) with constant `rates` (nq,).
+    """Advance q (nq,) by dt (s) at constant `rates` (nq,).
 
     Unit quaternions, which begin at the indices `quaternions`, rotate at constant angular velocity
-    and keep unit length.
+    and retain unit length.
     """
     moved = q + rates * dt
     for first in quaternions:

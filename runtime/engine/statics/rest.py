@@ -1,4 +1,4 @@
-"""Static equilibrium by Newton's method and load steps: coordinates that need no effort.
+"""Static equilibrium by Newton's method and load steps.
 
 Efforts of different kinds (N and N*m, of an axial shape and of a twist) are never compared: every
 stiffness is scaled by those of its own coordinate, and every step by the characteristic scale of
@@ -16,30 +16,31 @@ from numpy.typing import NDArray
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-_MAX_STEP = 0.5  # step, in characteristic scales of the coordinates
-#: Scaled stiffness below which a direction counts as slack: by simple differences, and by exact
-#: ones, which are used after steps shorter than the third number, in characteristic scales.
+_MAX_STEP = 0.5  # in characteristic scales of the coordinates
+#: Scaled stiffness below which a direction counts as slack: for central differences, and for those
+#: of fourth order, which are used after steps shorter than the third number, in characteristic
+#: scales.
 _SLACK_STIFFNESS, _SLACK_EXACT_STIFFNESS, _EXACT_STEP = 1e-8, 1e-10, 0.1
 _MAX_ITERATIONS, _MAX_ITERATIONS_OF_A_PART = 200, 20
 #: Forces without potential have no descent direction: relative asymmetry of their stiffness, and
-#: the number of iterations that then shows whether Newton's method converges.
+#: number of iterations after which Newton's method then counts as not convergent.
 _MAX_ASYMMETRY, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
 _MAX_HALVINGS = 40
-#: Permitted growth of efforts in a step: by this factor, or up to those of such a motion in
-#: characteristic scales.
+#: Permitted growth of efforts in a step: by the first factor, or up to the efforts of a motion of
+#: the second size, in characteristic scales.
 _MAX_EFFORT_GROWTH, _MAX_EFFORT_MOTION = 10.0, 1e-3
-#: Steps of the difference quotients in characteristic scales: coarse, fine, and of fourth order,
-#: which are exact to about 1e-12, simple ones to 1e-8.  A stiffness that is no rounding agrees with
-#: the fine ones.
+#: Steps of the difference quotients in characteristic scales: coarse, fine, and of fourth order.
+#: Errors are about 1e-12 for those of fourth order and 1e-8 for the others.  A stiffness above
+#: rounding agrees with the fine ones.
 _COARSE_STEP, _FINE_STEP, _FOURTH_ORDER_STEP = 1e-4, 1e-5, 1e-3
-#: Stiffness that is rounding, relative to the largest one, all in J.
+#: Stiffness that counts as rounding, relative to the largest one, all in J.
 _RELATIVE_ROUNDING = 1e-16
-#: First fraction of the load that is tried if the whole load fails, and the smallest.
+#: Initial load step if the whole load fails, and smallest load step, as fractions of the load.
 _INITIAL_LOAD_STEP, _MIN_LOAD_STEP = 0.25, 2.0**-10
 
 
 class Unsettled(NumericalFailure):
-    """No equilibrium found; `residual` (n,) are the remaining efforts in the coordinates."""
+    """Equilibrium not found; `residual` (n,) are the remaining efforts in the coordinates."""
 
     def __init__(self, message: str, residual: Array, problem: Rest | None = None) -> None:
         super().__init__(message)
@@ -62,8 +63,8 @@ class Rest:
     """Equilibrium problem in n coordinates.
 
     Attributes:
-        needed: q -> efforts (n,) that equilibrium needs in the coordinates, N, N*m.
-        moved: q and a small motion (n,) -> q after it.
+        needed: q -> efforts (n,) required for equilibrium in the coordinates, N, N*m.
+        moved: q and a small motion (n,) -> q after the motion.
         sizes: (n,) characteristic scales of the coordinates: 1 rad, the length of a body; m, rad.
         places: indices of the coordinates among the speeds of the scene.
         there: q -> the same problem in coordinates that are independent at that q.
@@ -76,11 +77,11 @@ class Rest:
     there: Callable[[Array], Rest] | None = None
 
     def at(self, q: Array) -> Rest:
-        """The same problem in coordinates that are independent at q."""
+        """Same problem in coordinates that are independent at q."""
         return self if self.there is None else self.there(q)
 
     def efforts(self, q: Array) -> Array:
-        """Efforts (n,) times characteristic scales, J.  NumericalFailure if not finite."""
+        """Efforts (n,) times characteristic scales, J; raises NumericalFailure if not finite."""
         with np.errstate(all="ignore"):
             scaled_efforts = self.needed(q) * self.sizes
         if not np.isfinite(scaled_efforts).all():
@@ -107,7 +108,7 @@ class Rest:
 
 
 def find_determined_equilibrium(problem: Rest, q: Array, tolerance: float) -> Array:
-    """Find an equilibrium as `approached` does; Undetermined if it has neutral directions."""
+    """Find an equilibrium by `approached`; raises Undetermined if it has neutral directions."""
     equilibrium_q = approached(problem, q, tolerance)
     unstable_coordinates(problem.at(equilibrium_q), equilibrium_q)
     return equilibrium_q
@@ -116,8 +117,8 @@ def find_determined_equilibrium(problem: Rest, q: Array, tolerance: float) -> Ar
 def approached(problem: Rest, q: Array, tolerance: float) -> Array:
     """Find q at rest, to `tolerance` times the characteristic scales, or to rounding.
 
-    Newton's method is applied to the whole load, else in load steps: the efforts missing at the
-    start act as external efforts, which are reduced to zero in steps.  Raises Unsettled.
+    Newton's method is applied to the whole load; if that fails, the unbalanced efforts at the start
+    act as external efforts, which are reduced to zero in load steps.  Raises Unsettled.
     """
     try:
         return _solve_newton(problem, q, tolerance, _MAX_ITERATIONS, _descent_step)
@@ -158,7 +159,7 @@ def _with_external_efforts(
 # --- Newton's method ------------------------------------------------------------------------------
 
 
-#: (slope, residual, scale, stiffness that is slack) -> step; all (n,) in sizes, or (n, n).
+#: (slope, residual, scale, slack stiffness) -> step; all (n,), or (n, n), in characteristic scales.
 Stepping = Callable[[Array, Array, Array, float], Array]
 
 
@@ -200,7 +201,7 @@ def _is_asymmetric(slope: Array, scale: Array) -> bool:
 
 
 def _stiffness_scale(slope: Array, residual: Array, noise: Array | float = 0.0) -> Array:
-    """Scale (n,) of the stiffness of each coordinate: the largest of K_ii, K_ij^2 / K_jj, effort.
+    """Stiffness scale (n,) of each coordinate: the largest of K_ii, K_ij^2 / K_jj, effort.
 
     `noise` is the rounding error of K_jj.
     """
@@ -210,11 +211,11 @@ def _stiffness_scale(slope: Array, residual: Array, noise: Array | float = 0.0) 
 
 
 def _descent_step(slope: Array, residual: Array, scale: Array, soft: float) -> Array:
-    """Newton step if the stiffness is positive definite, else a modified step of descent.
+    """Newton step if the stiffness is positive definite, else a modified descent step.
 
-    In directions with negative or zero stiffness Newton's step would ascend or be too long; there
-    the step follows the forces, so that unstable equilibria are avoided (for forces without
-    potential this is only a heuristic).
+    In directions of negative or zero stiffness a Newton step would ascend or be too long; there the
+    step follows the forces, so that unstable equilibria are avoided (for forces without potential
+    this is only a heuristic).
     """
     root = np.sqrt(scale)
     scaled_stiffness, scaled_efforts = slope / np.outer(root, root), residual / root
@@ -226,7 +227,7 @@ def _descent_step(slope: Array, residual: Array, scale: Array, soft: float) -> A
 
 
 def _newton_step(slope: Array, residual: Array, scale: Array, _: float) -> Array:
-    """Unmodified Newton step: the equilibrium for the previous load is near."""
+    """Unmodified Newton step, for use near the equilibrium for the previous load."""
     root = np.sqrt(scale)
     try:
         return np.asarray(np.linalg.solve(slope / np.outer(root, root), -residual / root) / root)
@@ -237,12 +238,12 @@ def _newton_step(slope: Array, residual: Array, scale: Array, _: float) -> Array
 def _line_search(
     problem: Rest, q: Array, residual: Array, step: Array, scale: Array
 ) -> tuple[Array, Array, bool]:
-    """Line search: q after the step, the efforts there, and whether they are smaller.
+    """Line search: q after the step, the efforts there, and whether they have decreased.
 
-    The step, at most _LONGEST long, is halved until its end is a valid state and the efforts
-    decrease or do not reverse.  If forces have a potential, `needed` is its gradient: the step has
-    not passed the minimum far unless the gradient along it has reversed to more than half its size.
-    The efforts must also not grow much across a direction of little stiffness.
+    The step, limited to `_MAX_STEP`, is halved until its end is a valid state and the efforts
+    decrease or do not reverse.  If forces have a potential, `needed` is its gradient: a step that
+    passes the minimum far reverses the gradient along it to more than half its size.  The efforts
+    must also not grow much across a direction of little stiffness.
     """
     step = step / max(1.0, float(np.abs(step).max(initial=0.0)) / _MAX_STEP)
     size_before, work = _scaled_norm(residual, scale), abs(float(residual @ step))
@@ -278,13 +279,13 @@ def _scaled_norm(residual: Array, scale: Array) -> float:
 
 
 def _stiffness_and_noise(problem: Rest, q: Array) -> tuple[Array, Array]:
-    """Stiffness (n, n) in J, and the difference of two difference quotients of it."""
+    """Stiffness (n, n) in J, and its deviation between two difference quotients."""
     exact, fine = problem.exact_slope(q), problem.slope(q, _FINE_STEP)
     return exact, np.abs(exact - fine)
 
 
 def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
-    """True if the remaining efforts are rounding of larger ones that cancel."""
+    """True if the remaining efforts are rounding errors of larger ones that cancel."""
     _, noise = _stiffness_and_noise(problem, q)
     return bool((np.abs(residual) <= 10 * _FINE_STEP * noise.max(axis=1, initial=0.0)).all())
 
@@ -292,10 +293,10 @@ def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
 def unstable_coordinates(problem: Rest, q: Array) -> tuple[int, ...]:
     """Unstable coordinates of an equilibrium, by negative stiffness.
 
-    Empty if efforts have no potential, because their stiffness then does not show stability.
-    Raises Undetermined for directions whose stiffness is rounding relative to that of their
-    coordinates, Unsettled for remaining efforts that no small motion removes: next to a coordinate
-    without stiffness the scale of another one may be so large that steps become short far from
+    Empty if efforts have no potential, because their stiffness then does not determine stability.
+    Raises Undetermined for directions with stiffness at rounding level relative to that of their
+    coordinates, and Unsettled for remaining efforts that no small motion removes: with a coordinate
+    without stiffness, the scale of another one may be so large that steps become short far from
     equilibrium.
     """
     stiffness, noise = _stiffness_and_noise(problem, q)

@@ -1,12 +1,13 @@
-"""Static equilibrium by pseudo-transient continuation with the factored tangent, O(bodies) a step.
+"""Static equilibrium by pseudo-transient continuation, O(bodies) per step.
 
     (K + sigma W) x = -R(q),   J x = 0
 
-is a step of descent if forces have a potential: R are the efforts that equilibrium lacks, K their
-derivatives, J the rows of closed loops, and W the inertia with rotors on the hinges.  Equilibrium
-does not depend on W, but the path to it does: with the inertia of bodies only, chains of many links
-under compression fold up.  sigma, an inverse time squared, decreases while steps descend, so that
-the iteration ends as Newton's method (Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998) 508-523).
+is a descent step if forces have a potential: R are the unbalanced efforts, K their derivatives, J
+the rows of closed loops, and W the inertia with rotors on the hinges.  Equilibrium does not depend
+on W, but the path to it does: with body inertia only, chains of many links under compression fold
+up.  sigma, an inverse time squared, decreases while steps descend, so that the iteration ends as
+Newton's method (Kelley and Keyes, SIAM J. Numer. Anal. 35 (1998) 508-523).  Each step factors the
+tangent once.
 """
 
 from __future__ import annotations
@@ -25,24 +26,24 @@ from .shifted_stiffness import ShiftedStiffness, SolutionIsRounding
 MAX_STEPS = 2000
 #: Longest step and first step, in characteristic scales of the coordinates.
 _MAX_STEP, _FIRST_STEP = 0.5, 0.05
-#: Factors by which sigma decreases after a step of descent, and increases after a failed step.
+#: Factors by which sigma decreases after a descent step, and increases after a failed step.
 _SIGMA_DECREASE, _SIGMA_INCREASE = 4.0, 4.0
 #: The search fails if sigma exceeds this multiple of its first value.
 _MAX_SIGMA_RATIO = 1e8
-#: Steps, in characteristic scales, below which efforts may be rounding; factor by which sigma
+#: Step length, in characteristic scales, below which efforts may be rounding; factor by which sigma
 #: decreases after steps within the tolerance; fraction of its first value that counts as zero.
 _ROUNDING_STEP, _SIGMA_FAST_DECREASE, _MIN_SIGMA_RATIO = 1e-6, 64.0, 1e-20
-#: Relative changes of q that reveal rounding, their number, and a safety factor.
+#: Relative perturbations of q that reveal rounding, their number, and a safety factor.
 _PERTURBATION, _PERTURBATION_COUNT, _SAFETY_FACTOR = 4e-16, 3, 10.0
-#: Rounding of efforts, relative to those that cancel.
+#: Rounding error of efforts, relative to those that cancel.
 _CANCELLATION_ROUNDING = 2e-16
 
 
 class RestBySweep:
     """Search for a static equilibrium from one state.
 
-    `settled` corrects the drives, quaternions and loops of a state or raises NumericalFailure,
-    `load` is the work, J, of all forces that may cancel, over characteristic motions; `progress` is
+    `settled` corrects the drives, quaternions and loops of a state or raises NumericalFailure;
+    `load` is the work (J) of all forces that may cancel, over characteristic motions; `progress` is
     called with the number of every step and its length in characteristic scales.
     """
 
@@ -57,12 +58,12 @@ class RestBySweep:
         self.stiffness, self.settled, self.most, self.progress = stiffness, settled, most, progress
         self.cancelled = _CANCELLATION_ROUNDING * load  #: J, for tests with the smallest sigma
         self.steps = 0  #: number of steps of the last search
-        self._least = 0.0  # smallest sigma with which solutions are no rounding
+        self._least = 0.0  # smallest sigma with solutions above rounding
 
     def find(self, q: Array, tolerance: float) -> Array:
         """Find q (nq,) at rest, to `tolerance` times the characteristic scales, or to rounding.
 
-        Raises Unsettled with the missing efforts (nu,) after `most` steps.
+        Raises Unsettled with the unbalanced efforts (nu,) after `most` steps.
         """
         self.steps, q = 0, self.settled(q)
         missing_efforts, is_near = self.stiffness.residual(q), False
@@ -96,9 +97,9 @@ class RestBySweep:
         raise Unsettled(f"not at rest after {self.most} steps", missing_efforts)
 
     def _step(self, missing: Array, sigma: float, tolerance: float) -> Array | None:
-        """Step from the state of the last residual, at most _LONGEST long.
+        """Step from the state of the last residual, limited to `_MAX_STEP`.
 
-        None if it is not certain that it descends, unless it is within the tolerance.
+        None if descent is uncertain, unless the step is within the tolerance.
         """
         stiffness = self.stiffness
         try:
@@ -115,7 +116,7 @@ class RestBySweep:
         return step / max(1.0, length / _MAX_STEP)
 
     def _ahead(self, q: Array, step: Array, missing: Array) -> tuple[Array, Array] | None:
-        """State q after a step, and the missing efforts there.
+        """State q after a step, and the unbalanced efforts there.
 
         None if no valid state is near, if the step ascends, or if it passes the minimum far.  The
         tangent must be that of q: it converts a motion to a change of coordinates.
@@ -132,7 +133,7 @@ class RestBySweep:
         return next_q, next_efforts
 
     def _is_rounding(self, q: Array, missing: Array, cancelled: float = 0.0) -> bool:
-        """True if the missing efforts are rounding of q, or of cancelling efforts (J)."""
+        """True if unbalanced efforts are rounding errors of q or of cancelling efforts (J)."""
         random_generator, noise = (
             np.random.default_rng(0),
             cancelled / _SAFETY_FACTOR / self.stiffness.sizes,

@@ -1,8 +1,8 @@
-"""Shifted stiffness K + sigma W of a scene at rest, W its inertia: products, solutions, O(bodies).
+"""Shifted stiffness K + sigma W of a scene at rest: products and solutions in O(bodies).
 
-Solutions are motions that closed loops permit.  A tree is eliminated without its loops and springs,
-with very small pivots if only these support it.  Each solution is therefore refined by its
-residual, and rejected if refinement does not converge.
+W is the inertia.  Solutions are motions that closed loops permit.  The tree is eliminated without
+its loops and springs, with very small pivots if only these support it.  Each solution is therefore
+refined by its residual, and rejected if refinement does not converge.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _CONVERGED_CHANGE, _MAX_REFINEMENTS = 1e-4, 3
 
 
 class SolutionIsRounding(NumericalFailure):
-    """Failure: with so small a sigma solutions are rounding."""
+    """Failure: sigma is so small that solutions are rounding errors."""
 
 
 class ShiftedStiffness:
@@ -41,22 +41,22 @@ class ShiftedStiffness:
             first_speeds[closure.frame] + np.arange(system.body(closure.frame).nu)
             for closure in system.closures
         ]
-        #: Speeds of hinges that close loops, which follow the others.
+        #: Indices of the dependent speeds of hinges that close loops.
         self.own = np.concatenate([np.zeros(0, np.int64), *closing_speeds])
 
     def residual(self, q: Array) -> Array:
-        """Efforts R (nu,) that equilibrium lacks at q, to which all other calls refer then."""
+        """Compute the unbalanced efforts R (nu,) at q, to which subsequent calls refer."""
         return self.tangent.residual(self.t, q, self.still, self.still)
 
     def factor(self, sigma: float) -> None:
-        """Factor K + sigma W.  NumericalFailure if it is singular."""
+        """Factor K + sigma W; raises NumericalFailure if it is singular."""
         self.sigma = sigma
         self.tangent.factor(sigma, 1.0, 0.0, rate=0.0)
 
     def solve(self, efforts: Array) -> Array:
         """Solve (K + sigma W) x = efforts (nu,) for motions x (nu,) that loops permit.
 
-        Raises Unsolved if the solution is rounding.
+        Raises SolutionIsRounding if refinement does not converge.
         """
         x = self.tangent.solve(efforts)
         for _ in range(_MAX_REFINEMENTS):

@@ -3,10 +3,10 @@
 Of the motions that loops permit, those with the least stiffness relative to the inertia W are found
 by Arnoldi's method with (K + sigma W)^-1 W (W. E. Arnoldi, Q. Appl. Math. 9 (1951) 17-29; Y. Saad,
 Numerical Methods for Large Eigenvalue Problems, 2011, ch. 6): every eigenvalue kappa of K relative
-to W appears as 1 / (kappa + sigma), so that eigenvalues far below -sigma or near 0 are separated.
-Since sigma decreases from the largest kappa by factors, no negative eigenvalue is missed.  A
-direction counts as one without stiffness only if its stiffness is rounding of the state, however
-soft it is compared with others.
+to W appears as 1 / (kappa + sigma), which separates eigenvalues far below -sigma or near 0.  Since
+sigma decreases from the largest kappa by factors, no negative eigenvalue is missed.  However soft a
+direction is relative to others, it counts as neutral only if its stiffness is a rounding error of
+the state.
 """
 
 from __future__ import annotations
@@ -21,17 +21,20 @@ from mstmm.errors import NumericalFailure
 
 from .shifted_stiffness import ShiftedStiffness
 
-#: Vectors of one sequence, and relative remainder of a vector that depends on others.
+#: Maximum number of vectors of one Arnoldi sequence, and relative remainder below which a vector is
+#: linearly dependent.
 _MAX_VECTORS, _MIN_REMAINDER = 16, 1e-10
-#: Successive sigma relative to the largest kappa; eigenvalues kappa beyond _SEEN sigma are rounding
-#: of a sequence.  Kappa up to _SOFT of the largest may be zero; unless they are rounding, these
-#: agree with the stiffness of their motions to _ALIKE, others to _NEAR.
+#: Successive sigma relative to the largest kappa.  Eigenvalues kappa beyond `_MAX_KAPPA_RATIO`
+#: sigma are rounding errors of a sequence.  Kappa up to `_NEUTRAL_RATIO` of the largest one may be
+#: zero; unless they are rounding errors, these agree with the stiffness of their motions to
+#: `_SOFT_AGREEMENT`, others to `_MIN_AGREEMENT`.
 _SHIFTS = tuple(10.0**-k for k in range(0, 13, 2))
 _MAX_KAPPA_RATIO = 1e3
 _NEUTRAL_RATIO, _SOFT_AGREEMENT, _MIN_AGREEMENT = 1e-10, 1e-2, 0.5
-#: A sigma with which the stiffness is negligible, and number of powers of W^-1 K.
+#: Value of sigma at which the stiffness is negligible, and number of powers of W^-1 K.
 _LARGE_SIGMA, _POWER_STEPS = 1e200, 6
-#: Relative changes of q that reveal rounding of a stiffness, their number, and a safety factor.
+#: Relative perturbations of q that reveal rounding of a stiffness, their number, and a safety
+#: factor.
 _PERTURBATION, _PERTURBATION_COUNT, _SAFETY_FACTOR = 1e-14, 2, 10.0
 #: Relative asymmetry above which a stiffness has no potential.
 _MAX_ASYMMETRY = 1e-4
@@ -41,8 +44,8 @@ _MAX_ASYMMETRY = 1e-4
 class Stability:
     """Unstable and neutral motions (nu,) of an equilibrium.
 
-    Unstable motions are found only if efforts have a potential; of the neutral motions some are
-    selected at random.
+    Unstable motions are found only if efforts have a potential; neutral motions are a random
+    selection.
     """
 
     unstable: list[Array] = field(default_factory=list)
@@ -80,7 +83,7 @@ class _StabilitySearch:
         return Stability([] if is_skew else unstable, neutral)
 
     def _largest(self) -> float:
-        """Magnitude of the largest kappa, by a few powers of W^-1 K."""
+        """Magnitude of the largest kappa, by power iteration with W^-1 K."""
         self.stiffness.factor(_LARGE_SIGMA)
         motion, size = self._drawn(), 0.0
         for _ in range(_POWER_STEPS):
@@ -96,13 +99,13 @@ class _StabilitySearch:
         return math.sqrt(max(0.0, float(motion @ self.stiffness.inertia(motion))))
 
     def _drawn(self) -> Array:
-        """Random motion that loops permit, by the present factorisation."""
+        """Random motion that loops permit, by the current factorisation."""
         random_efforts = np.random.default_rng(0).standard_normal(len(self.stiffness.still))
         motion = self.stiffness.solve(random_efforts)
         return np.asarray(motion / (float(np.abs(motion).max(initial=0.0)) or 1.0))
 
     def _softest(self, sigma: float, soft: float) -> tuple[list[tuple[complex, Array]], bool]:
-        """Motions with kappa below `soft`, as far as this sigma reveals them; whether K is skew."""
+        """Motions with kappa below `soft` found with this sigma, and whether K is asymmetric."""
         try:
             self.stiffness.factor(sigma)
             basis, matrix = self._sequence()
@@ -122,7 +125,7 @@ class _StabilitySearch:
         return motions, bool(skew)
 
     def _sequence(self) -> tuple[Array, Array]:
-        """Motions (m, nu), orthonormal with W, and (K + sigma W)^-1 W (m, m) in their basis."""
+        """Motions (m, nu), W-orthonormal, and (K + sigma W)^-1 W (m, m) in this basis."""
         basis, inertia_products, matrix = (
             list[Array](),
             list[Array](),
@@ -147,7 +150,7 @@ class _StabilitySearch:
         return np.array(basis).reshape(n, len(motion)), matrix[:n, :n]
 
     def _stiffness(self, q: Array, motion: Array) -> tuple[float, float]:
-        """Stiffness of a motion relative to its inertia, and its error by rounding of q."""
+        """Stiffness of a motion relative to its inertia, and its rounding error due to q."""
         random_generator, values = np.random.default_rng(0), list[float]()
         for k in range(1 + _PERTURBATION_COUNT):
             self.stiffness.residual(

@@ -1,4 +1,4 @@
-"""Loads that no state balances: work along a motion that is the same wherever the scene is."""
+"""Loads without equilibrium: constant load along a motion in all states of the scene."""
 
 from __future__ import annotations
 
@@ -9,23 +9,25 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from .rest import Rest
 
-#: Coordinates up to which states are drawn, states beyond their number, and draws for each state.
+#: Maximum number of coordinates, number of random states in addition to that of coordinates, and
+#: number of attempts per state.
 _MOST, _SPARE, _DRAWS = 200, 12, 2
-#: Distances of the states, in sizes: far enough to meet stops and the stiffness of soft springs.
+#: Distances of the states, in characteristic scales: far enough to reach stops and the stiffness of
+#: soft springs.
 _NEAREST, FARTHEST = 0.1, 1e4
-#: Variation of efforts that is rounding, in parts of the largest ones and of the load found.
+#: Variation that counts as rounding: of efforts, relative to the largest ones, and of the load.
 _ROUNDING, _CONSTANT = 1e-9, 1e-6
-#: Efforts are compared with the largest of their coordinate, or with this part of the largest.
+#: Smallest scale of the efforts of a coordinate, relative to the largest scale.
 _LEAST = 1e-5
 
 
 def find_unbalanced_motion(
     problem: Rest, q: Array, farthest: float = FARTHEST
 ) -> tuple[Array, int] | None:
-    """Motion (n,) along which the load is a constant other than 0, and the number of states seen.
+    """Motion (n,) with a constant non-zero load along it, and the number of states examined.
 
-    The states are drawn around q, from 0.1 to `farthest` sizes away.  None where every load varies,
-    or where too few of the states exist.
+    Random states are drawn around q, at distances from 0.1 to `farthest` characteristic scales.
+    None if every load varies, or if too few of the states are valid.
     """
     count = len(problem.sizes)
     if not 0 < count <= _MOST:
@@ -48,7 +50,7 @@ def find_unbalanced_motion(
 
 
 def _drawn_efforts(problem: Rest, q: Array, count: int, farthest: float) -> Array:
-    """Efforts in J at q and at states drawn, `count` (k, n) of them or fewer."""
+    """Efforts (k, n), J, at q and at random states around it, with k at most `count`."""
     draw, found = np.random.default_rng(0), [problem.efforts(q)]
     for _ in range(_DRAWS * count):
         if len(found) == count:
