@@ -37,7 +37,7 @@ class DynamicStiffnessBodies(NamedTuple):
 
 
 class HarmonicResponse:
-    """Dynamic stiffness Z(s) of one scene about one state; not thread-safe.
+    """Dynamic stiffness Z(s) of one scene about one state; use one instance per thread.
 
     `lanes` is the number of s evaluated together, 2 or 4; 0 for the maximum of the processor.
     `stiffer` is the scene with elastic stiffness increased by the loss factors; `exact` are bodies
@@ -109,7 +109,7 @@ class HarmonicResponse:
         return stiffness_rows
 
     def undamped(self) -> None:
-        """Omit the terms linear in s from now on."""
+        """Omit the terms linear in s in subsequent calls."""
         self._kept["brought"][: len(self.tangent.numbers)] = 0.0
 
     def count_negative(self, squares: Array) -> Integers:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class TangentMatrix:
-    """Residual and tangent of one scene; not thread-safe.
+    """Residual and tangent of one scene; use one instance per thread.
 
     Prescribed and fixed speeds have no rows: their entries in residuals and solutions are zero.
     """
@@ -164,7 +164,7 @@ class TangentMatrix:
         return sizes.astype(np.int64), pivots
 
     def allow_negative(self) -> None:
-        """Accept negative pivots from now on, for callers that count them."""
+        """Accept negative pivots in subsequent factorisations, for callers that count them."""
         self.record.counts = 1
 
     def rates(self, q: Array, u: Array) -> Array:

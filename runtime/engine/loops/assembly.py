@@ -72,7 +72,7 @@ def engine_with_held(engine: LoopedEngine, hinges: Collection[str]) -> LoopedEng
 class Assembly:
     """Assembly of one packed scene at `t` (s) near `q` (nq,), with some hinges fixed.
 
-    `behind` returns the cause of loops that do not close near a q, for messages, or "".
+    `behind` maps q to the cause of loops that do not close near it, for messages, or "".
     """
 
     def __init__(

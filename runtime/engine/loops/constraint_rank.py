@@ -206,7 +206,7 @@ def _redundant_rows(calls: LoopCalls, q: Array, level: Array) -> frozenset[int]:
 def _closed_neighbour(calls: LoopCalls, q: Array, speeds: Array, settled: float) -> Array | None:
     """Closed state along the projected `speeds`, to an accuracy of `settled` (rad, m).
 
-    None if they lead to none.
+    None if there is no such state.
     """
     try:
         ahead_q = _move_along(calls, q, speeds, _NEIGHBOUR_DISTANCE, np.zeros(calls.count))
