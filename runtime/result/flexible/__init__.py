@@ -1,1 +1,1 @@
-"""What results say of flexible bodies: sections, energies, estimators, pictures."""
+"""Results of flexible bodies: sections, energies, range estimators, plots."""

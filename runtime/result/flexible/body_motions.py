@@ -1,4 +1,4 @@
-"""Flexible bodies of a run: their motion, and the loads on their sections."""
+"""Motions and section loads of the flexible bodies of a run."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class FlexibleBodies:
     def __init__(self, model: CompiledScene, observed: Observations) -> None:
         self.model, self.observed, self.run = model, observed, observed.run
         self.known: Mapping[str, ModalBody] = model.flexible
-        self.one_way: Collection[str] = ()  # those that respond, and are no part of the run
-        self.unbalanced: Collection[str] = ()  # loads on their ends leave their motion out
+        self.one_way: Collection[str] = ()  # one-way bodies, not part of the run
+        self.unbalanced: Collection[str] = ()  # their motion omits the loads on their ends
         self._motions: dict[str, Motion] = {}
 
     def body(self, name: str, what: str) -> ModalBody:
-        """The numbers of a flexible body; SceneError for another body, or none, of this name."""
+        """Modal data of a flexible body; SceneError for a rigid or unknown body."""
         modal_body = self.known.get(self.observed.references.canonical(name) or name)
         if modal_body is not None:
             return modal_body
@@ -65,15 +65,15 @@ class FlexibleBodies:
         return self._motions[name]
 
     def coupled_start(self) -> tuple[CompiledScene, Array]:
-        """A model in which all of them are coupled, and its q at the start of the run."""
+        """Model in which all flexible bodies are coupled, and its q at the start of the run."""
         return self.model, self.run.first[1]
 
     @cached_property
     def gravity(self) -> Array:
-        """(3,) m/s2, inertial axes."""
+        """Gravity (3,), m/s2, inertial axes."""
         return np.array(self.model.scene.gravity)
 
-    # --- what acts on a body --------------------------------------------------------------------
+    # --- loads on a body ------------------------------------------------------------------------
 
     def held_end(self, name: str) -> str:
         """Name of the inboard end of a body."""
@@ -87,12 +87,14 @@ class FlexibleBodies:
         return inboard_hinges_by_body(self.model.scene)
 
     def held_place(self, name: str) -> float:
-        """The x in m of the section through which a beam hangs on the tree."""
+        """Position x (m) of the section by which a beam is attached to the tree."""
         return float(self.known[name].ports[self.held_end(name)].position[0])
 
     def at_end(self, name: str, end: str) -> tuple[Array, Array] | None:
-        """Force and moment (n, 3) of the outside on a port of a body, at the section's point,
-        inertial axes; None where nothing is attached.  Not known of the end that is held."""
+        """External force and moment (n, 3) on a port, inertial axes; None if nothing is attached.
+
+        Moments are about the section's point. Not available for the inboard end.
+        """
         hinge_index = self.observed.engine.packed.hinge_position.get(f"{name}/{end}")
         if hinge_index is None:
             return None
@@ -100,8 +102,7 @@ class FlexibleBodies:
         return -load[:, :3], -load[:, 3:]
 
     def end_loads(self, name: str) -> dict[str, tuple[Array, Array]]:
-        """Port -> force and moment (n, 3) of the outside on it, inertial axes, of all but the held
-        end."""
+        """External force and moment (n, 3) by port, inertial axes, except at the inboard end."""
         inboard_end, loads = self.held_end(name), dict[str, tuple[Array, Array]]()
         for port in self.known[name].ports:
             load = None if port == inboard_end else self.at_end(name, port)
@@ -110,8 +111,10 @@ class FlexibleBodies:
         return loads
 
     def held_load(self, name: str) -> tuple[Array, Array]:
-        """Force and moment (n, 3) of the hinge that holds a body on its held end, at the section's
-        point, inertial axes."""
+        """Force and moment (n, 3) of the inboard hinge on the inboard end, inertial axes.
+
+        Moments are about the section's point.
+        """
         hinge_index = self.observed.engine.packed.hinge_position[self._holders[name].name]
         load = self.observed.columns("loads", (hinge_index,))
         return load[:, :3], load[:, 3:]

@@ -1,5 +1,7 @@
-"""Flexible bodies in a Dataset: energies and motions over time, and the shapes that give the
-deflection anywhere along a beam from the modal coordinates in q."""
+"""Variables of flexible bodies in a Dataset: energies, motions and shape functions.
+
+The shape functions give the deflection anywhere along a beam from the modal coordinates in q.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +17,16 @@ if TYPE_CHECKING:
 
 Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
-#: Stations along a beam at which its shapes are written.
+#: Stations along a beam at which its shape functions are written.
 STATION_COUNT = 41
 
-#: Flexible bodies up to which the shapes of each are written; of more the scene in the file tells.
+#: Largest number of flexible bodies whose shape functions are written; for more, use the scene in
+#: the file.
 _MAX_WRITTEN_BODIES = 40
 
 
 def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
-    """Name -> (dimension, words, long name)."""
+    """Map from name to (dimension, labels, long name)."""
     bodies = result.model.flexible
     if not bodies:
         return {}
@@ -35,7 +38,7 @@ def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
 
 
 def variables(result: Record) -> dict[str, Variable]:
-    """Energies of modes, equivalent motions of flexible bodies, shapes of beams."""
+    """Modal energies, equivalent motions of flexible bodies, and shape functions of beams."""
     bodies = result.model.flexible
     if not bodies:
         return {}
@@ -62,7 +65,7 @@ def variables(result: Record) -> dict[str, Variable]:
 
 
 def _shape_variables(name: str, body: ModalBody) -> dict[str, Variable]:
-    """deflection = phi eta - 1/2 eta^T second_order eta."""
+    """Shape functions of a beam: deflection = phi eta - 1/2 eta^T second_order eta."""
     shapes = body.shapes
     assert shapes is not None
     x = np.linspace(0.0, shapes.length, STATION_COUNT)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _XYZ = ("x", "y", "z")
 
-#: Of any body: unit, long name, columns, and the method of `Result` that gives it.
+#: For every body: unit, long name, columns, and the method of `Result` that returns it.
 BODY_QUANTITIES = {
     "momentum": (QuantityKind("kg*m/s", "linear momentum", _XYZ, ()), "momentum_of"),
     "angular_momentum": (
@@ -41,7 +41,7 @@ BODY_QUANTITIES = {
     ),
 }
 
-#: At the ends of beams, in axes of the frame or of the section.
+#: At the ends of beams, in frame or section axes.
 END_QUANTITIES = {
     "deflection": (QuantityKind("m", "elastic displacement, frame axes", _XYZ, ()), "deflection"),
     "slope": (QuantityKind("", "slope against the frame along", ("y", "z"), ()), "slope"),
@@ -53,13 +53,13 @@ END_QUANTITIES = {
     ),
 }  # fmt: skip
 
-#: Of these only the first is written into files for every end: the others take longer to compute
-#: than everything else together.
+#: Only these are written into files for every end; the others take longer to compute than all other
+#: quantities together.
 LISTED_END_QUANTITIES = ("deflection",)
 
 
 def add_body_quantities(table: Table, results: FlexibleResults, reference: str) -> None:
-    """Names of a body or an end, behind those that all have."""
+    """Add the names of a body or an end after those common to all."""
     body, end = split_reference(reference)
     flexible = results.model.flexible.get(body)
     if end:

@@ -1,10 +1,11 @@
-"""Loads that could buckle a beam in a way for which it has no shapes.
+"""Buckling loads of a beam in directions for which it has no shape functions.
 
-Sideways a beam buckles where the loads do more work than its stiffness takes up.  With phi the
-slope of a deflection across, compression N does the work int N phi^2 against int EI phi'^2; with
-phi the twist of its sections, moments M in the stiff plane bend it across by M phi / EI, which is
-work of int M^2 phi^2 / EI against int GI_t phi'^2 (Timoshenko and Gere, Theory of Elastic
-Stability, 2nd ed., sections 2.8 and 6.3).  Both are one question, with phi = 0 where it is held.
+A beam buckles laterally where the work of the loads exceeds its strain energy. With phi the slope
+of a transverse deflection, compression N does the work int N phi^2 against int EI phi'^2. With phi
+the twist of the sections, moments M in the stiff plane bend the beam transversely by M phi / EI,
+which is work of int M^2 phi^2 / EI against int GI_t phi'^2 (Timoshenko and Gere, Theory of Elastic
+Stability, 2nd ed., sections 2.8 and 6.3). Both are the same eigenvalue problem, with phi = 0 at the
+inboard section.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from ...flexible.beam.section_ports import BeamShapes
 from ...flexible.modal_body import ModalBody
 from .range_estimators import has_bending_shapes
 
-#: Quarter waves of phi on either side of the held section.
+#: Quarter waves of phi on either side of the inboard section.
 _QUARTER_WAVES = 6
-#: What is shorter, as part of a beam, does not buckle.
+#: Shorter parts, relative to the length of the beam, do not buckle.
 _MIN_LENGTH_RATIO = 0.01
 
 
 def quadrature_rule(shapes: BeamShapes, held: float) -> tuple[Array, Array]:
-    """Places and weights (m) along a beam held at x = `held`, for its shapes and phi."""
+    """Points and weights (m) along a beam fixed at x = `held`, for its shapes and phi."""
     waves = _QUARTER_WAVES / 2 / min(map(abs, _distances_to_ends(shapes.length, held)))
     return gauss_between(
         np.union1d(shapes.pieces, [held]), lambda a, b: max(shapes.density(a, b), waves)
@@ -33,7 +34,7 @@ def quadrature_rule(shapes: BeamShapes, held: float) -> tuple[Array, Array]:
 
 
 def _distances_to_ends(length: float, held: float) -> list[float]:
-    """From the held section to either end, in m along x, but for stubs."""
+    """Signed distances (m along x) from the inboard section to either end, without stubs."""
     return [reach for reach in (-held, length - held) if abs(reach) > _MIN_LENGTH_RATIO * length]
 
 
@@ -46,12 +47,11 @@ def lateral_load_ratio(
     force: Array,
     moment: Array,
 ) -> float | None:
-    """Largest load over the one that buckles the beam in a way for which it has no shapes.
+    """Largest ratio of load to buckling load in directions without shape functions.
 
-    `force` and `moment` (n, m, 3) in N and N*m are what its sections carry, in their own axes, at
-    the points x (m,) in m of a `quadrature_rule`.  It is held at x = `held` (m) alone, and `line`
-    in m is the length of the straight line of beams that it is a part of.  None for a beam with
-    all shapes.
+    `force` and `moment` (n, m, 3) in N and N*m are section loads in section axes at the points x
+    (m,) in m of a `quadrature_rule`. The beam is fixed at x = `held` (m) only; `line` (m) is the
+    length of the straight line of beams that contains it. None for a beam with all shape functions.
     """
     if body.shapes is None:
         return None
@@ -79,7 +79,7 @@ def lateral_load_ratio(
         if not has_bending_shapes(body, plane):
             ratios.append(length_ratio**2 * largest(-force[..., 0], compliant))
         if np.min(sections.GI_t) > 0:
-            share = np.maximum(1 - compliant / stiff, 0.0)  # as soft in its plane it just bends
+            share = np.maximum(1 - compliant / stiff, 0.0)  # 0 at equal stiffness: no buckling
             square = share * moment[..., component] ** 2 / compliant
             ratios.append(length_ratio * np.sqrt(largest(square, sections.GI_t)))
     return max(ratios, default=None)
@@ -88,8 +88,10 @@ def lateral_load_ratio(
 def _max_work_ratio(
     load: Array, stiffness: Array, x: Array, weights: Array, length: float
 ) -> float:
-    """Largest int load phi^2 / int stiffness phi'^2 over all samples of `load` (n, m), at least 0;
-    phi = 0 at x = 0, and free at x = length."""
+    """Largest int load phi^2 / int stiffness phi'^2 over all samples of `load` (n, m).
+
+    At least 0; phi = 0 at x = 0, and free at x = length.
+    """
     wave_numbers = (np.arange(_QUARTER_WAVES) + 0.5) * np.pi / length
     phi, rate = (
         np.sin(np.outer(wave_numbers, x)),

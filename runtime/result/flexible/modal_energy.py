@@ -1,4 +1,4 @@
-"""Energies of a flexible body by mode, and how much of them the shapes that were kept can hold."""
+"""Energies of a flexible body by mode, and its modal frequencies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def modal_mass(body: ModalBody) -> Array:
-    """(n, n) int rho phi . phi in kg; of a body in mass points, theirs."""
+    """Modal mass matrix (n, n), int rho phi . phi in kg; for mass points, their sum."""
     if not body.points:
         return np.einsum("aakl->kl", body.F)
     total = np.zeros_like(body.K)
@@ -26,25 +26,29 @@ def modal_mass(body: ModalBody) -> Array:
 
 
 def strain_shares(motion: Motion) -> Array:
-    """(n, modes) 1/2 eta_k (K eta)_k in J; their sum is the strain energy."""
+    """Strain energy (n, modes) in J by mode, 1/2 eta_k (K eta)_k; the sum is the strain energy."""
     return 0.5 * motion.eta * (motion.eta @ motion.body.K)
 
 
 def modal_energy(motion: Motion) -> Array:
-    """(n, modes) energy in J of each mode: its shares of strain energy and of the kinetic energy of
-    the motion against the floating frame, 1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k."""
+    """Energy (n, modes) in J by mode: strain energy plus kinetic energy in the floating frame.
+
+    1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k.
+    """
     kinetic = 0.5 * motion.etad * (motion.etad @ modal_mass(motion.body))
     return strain_shares(motion) + kinetic
 
 
 def strain_energy(motion: Motion) -> Array:
-    """(n,) 1/2 eta^T K eta in J."""
+    """Strain energy (n,) in J, 1/2 eta^T K eta."""
     return strain_shares(motion).sum(axis=1)
 
 
 def modal_frequencies(body: ModalBody) -> Array:
-    """(n,) rad/s, ascending: of the modes while the floating frame stands still; zeros where they
-    have no mass that is told from rounding."""
+    """Modal frequencies (n,) in rad/s with a fixed floating frame, ascending.
+
+    Zeros where the modal mass cannot be distinguished from rounding.
+    """
     try:
         lower = np.linalg.cholesky(modal_mass(body))
         half = np.linalg.solve(lower, body.K)

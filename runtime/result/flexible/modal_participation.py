@@ -1,10 +1,11 @@
-"""Share of the inertia at its hinge that each shape of a flexible body holds (chi).
+"""Modal participation chi: share of each shape function in the inertia at its hinge.
 
-With chi_i = M_ri^T D^-1 M_ri / M_ii, 0 to 1, the coupled frequency of a shape is
-omega_i / sqrt(1 - chi_i): whether the vibration's reaction on the hinge may be left out.  D is the
-inertia at the nearest hinge inboard that moves, with the hinges outboard of it free and all modes
-held; M_ii is the inertia of the shape with what it carries.  Where loops close, D is the inertia of
-all independent motions of the hinges, and M that along speeds which keep the loops closed.
+With chi_i = M_ri^T D^-1 M_ri / M_ii, 0 to 1, the coupled frequency of a shape function is omega_i /
+sqrt(1 - chi_i); chi decides whether the reaction of the vibration on the hinge may be neglected. D
+is the inertia at the nearest moving hinge inboard, with the hinges outboard of it free and all
+modes fixed; M_ii is the inertia of the shape function including what it carries. In closed loops, D
+is the inertia of all independent hinge motions, and M is taken along speeds that satisfy the
+constraints.
 """
 
 from __future__ import annotations
@@ -22,14 +23,16 @@ if TYPE_CHECKING:
     from .body_motions import FlexibleBodies
 
 
-#: Speeds of a scene up to which its mass matrix is formed for this.
+#: Largest number of speeds for which the mass matrix is formed here.
 MAX_SPEEDS = 300
 
 
 def participation_by_body(flexible: FlexibleBodies) -> dict[str, Array]:
-    """Body -> chi (modes,) at the start of the run; without bodies that no moving hinge carries.
-    Empty for scenes with more than LARGEST speeds, loops in which shapes do not move by themselves,
-    and for a start that has no inertia matrix, as the run itself says."""
+    """Map from body to chi (modes,) at the start of the run; without bodies on no moving hinge.
+
+    Empty for scenes with more than `MAX_SPEEDS` speeds, for loops in which shape functions are not
+    independent motions, and for a start without an inertia matrix, which the run itself reports.
+    """
     if flexible.model.nu > MAX_SPEEDS or not len(flexible.run.t):
         return {}
     model, q = flexible.coupled_start()
@@ -59,7 +62,7 @@ def _tree_participation(
 def _loop_participation(
     flexible: FlexibleBodies, model: CompiledScene, q: Array
 ) -> dict[str, Array]:
-    """By the motions that loops leave, of which every shape has to be one."""
+    """Participation by independent motions of loops, which must include every shape function."""
     assert model.freedom is not None
     result, shapes = (
         dict[str, Array](),
@@ -82,7 +85,7 @@ def _loop_participation(
 def _participation_row(
     name: str, inertia: Array, own: list[int], modes: list[int], others: list[int]
 ) -> dict[str, Array]:
-    """Empty where a hinge has no inertia: not known."""
+    """Participation of one body; empty (unknown) where a hinge has no inertia."""
     try:
         return {name: _participation_of_modes(inertia, own, modes, others)}
     except np.linalg.LinAlgError:
@@ -96,7 +99,7 @@ def _modal_speed_indices(model: CompiledScene, name: str) -> list[int]:
 def _participation_of_modes(
     inertia: Array, own: list[int], modes: list[int], others: list[int]
 ) -> Array:
-    """chi of modes from the mass matrix, by speeds of the hinge, the modes and hinges beyond."""
+    """Participation chi of modes; `others` are the speed indices of hinges outboard."""
     indices, hinge_count = [*own, *modes], len(own)
     block = inertia[np.ix_(indices, indices)]
     if others:
@@ -116,14 +119,17 @@ def _bounds(places: slice) -> tuple[int, int]:
 
 
 def participation(rows: Array, hinge: Array, modal: Array) -> Array:
-    """(modes,) chi from the inertia between hinge and modes (nu, modes), that at the hinge (nu, nu)
-    and that of each mode (modes,)."""
+    """Participation chi (modes,) from blocks of the inertia matrix.
+
+    `rows` (nu, modes) couples hinge and modes, `hinge` (nu, nu) is the inertia at the hinge and
+    `modal` (modes,) that of each mode.
+    """
     reaction = np.linalg.solve(hinge, rows)
     return np.asarray(np.einsum("jk,jk->k", rows, reaction) / modal)
 
 
 class _Tree:
-    """Free speeds of the hinges, and what hangs on what."""
+    """Free speeds of the hinges, and the inboard body of each body."""
 
     def __init__(self, model: CompiledScene) -> None:
         layout, scene = model.layout, model.scene
@@ -139,7 +145,7 @@ class _Tree:
             ]
 
     def hinge_of(self, body: str) -> tuple[list[int], list[int]]:
-        """Speeds of the nearest moving hinge inboard of a body, and of all hinges beyond it."""
+        """Speeds of the nearest moving hinge inboard of a body, and of all outboard of it."""
         while body in self.inboard and not self.speeds[body]:
             body = self.inboard[body]
         if body not in self.inboard:

@@ -1,8 +1,8 @@
-"""How motion is carried through flexible bodies, for the judgement of the sweep's pivots.
+"""Transfer of motion through flexible bodies, for the check of the pivots of the sweep.
 
-With its modes condensed a body that its frame carries by delta answers with etadd = -G delta, so a
-section moves by X delta + H etadd; where the frame follows the section that is held, the frame
-itself by delta + H etadd.  The rounding of the body's own inertia counts in frame and modes alike.
+With condensed modes, a body whose frame moves by delta responds with etadd = -G delta, so a section
+moves by X delta + H etadd; where the frame follows the inboard section, the frame itself moves by
+delta + H etadd. The rounding of the body's own inertia counts in both frame and modes.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 
 
 class ModalPivots:
-    """Where gains and subspaces of the flexible bodies stand in the workspace (`layout.h`): of a
-    body S_rf and the same re-based (6, n), the gain (n, 7), S_ff (n, n); of a section its subspace
-    (6, n)."""
+    """Offsets of gains and subspaces of the flexible bodies in the workspace (`layout.h`).
+
+    Of a body: S_rf and the same re-based (6, n), the gain (n, 7), S_ff (n, n); of a section: its
+    subspace (6, n).
+    """
 
     def __init__(self, packed: PackedScene, lib: Any) -> None:
         self._rows, self._based = lib.MSTMM_MODES_S_RF_PER_MODE, lib.MSTMM_MODES_BASED_PER_MODE
@@ -38,10 +40,10 @@ class ModalPivots:
     def through(
         self, numbers: Array, S: Array, carried: Array, parents: NDArray[np.int64], E: Array
     ) -> None:
-        """Change in place: `carried` (m, 6, 6), the motion of each body from that of its parent, to
-        what it is with the modes giving way, and the rounding `E` (m, 6, 6) of each flexible body.
+        """Add the modal response to the transferred motions and the rounding, in place.
 
-        `S` (m, 6, 6) are the inertias with the modes condensed.
+        `carried` (m, 6, 6) is the motion of each body from that of its parent, `E` (m, 6, 6) the
+        rounding of each flexible body, and `S` (m, 6, 6) are the inertias with condensed modes.
         """
         gains = {i: self._answer(numbers, i) for i in self.frames}
         for i, parent in enumerate(parents.tolist()):
@@ -65,7 +67,7 @@ class ModalPivots:
             )
 
     def _answer(self, numbers: Array, i: int) -> tuple[Array, Array]:
-        """G (n, 6), and the motion (6, 6) of the frame itself."""
+        """Gain G (n, 6), and the motion (6, 6) of the frame itself."""
         n, offset, section_offset = self.frames[i]
         first = offset + self._gain * n
         gain = numbers[first : first + 7 * n].reshape(n, 7)[:, :6]

@@ -27,46 +27,47 @@ if TYPE_CHECKING:
     from .motion import Motion
 
 
-#: Samples that are looked at, and flexible bodies of a scene.
+#: Largest numbers of samples and of flexible bodies that are examined.
 MAX_SAMPLES, MAX_BODIES = 160, 400
 
-#: Slopes below this are rounding: what bends so little is not judged by its shapes.
+#: Slopes below this are rounding; the shape functions are then not assessed.
 _ZERO_SLOPE = 1e-9
 
-#: Coordinates, rates and accelerations that are judged are below this.
+#: Coordinates, rates and accelerations above this are not assessed.
 _MAX_MAGNITUDE = 1e50
 
 
 @dataclass(frozen=True)
 class ModelRange:
-    """How far one flexible body went, over the samples of a run.
+    """Range of validity measures of one flexible body over the samples of a run.
 
     Attributes:
         name, modes, frame: of the body.
-        stiffening: second-order displacements are in its kinematics.
-        slope: kappa, the largest slope against its floating frame; the frame's own error is up to
+        stiffening: whether its kinematics include second-order displacements.
+        slope: kappa, the largest slope relative to its floating frame; the frame error is up to
             kappa^2 / 2.
-        turn: rad, largest rotation of a section against the frame, twist included.
-        first_frequency: rad/s of its shapes, the frame at rest.
-        spin_ratio: largest spin across the body over its first frequency.
-        gamma: (smallest, largest) eigenvalue of K^-1 K_g of the loads; None if not known.
-        last_share: largest share of the energy that the last shape of a family held, which one.
-        tail: part of the bending energy of the true section loads that the shapes miss, of an
-            elastic body of the deflection of its ends; None where it is not known.
-        coupling: share chi of the inertia at its hinge that the mode with the most energy holds,
+        turn: rad, largest rotation of a section relative to the frame, twist included.
+        first_frequency: rad/s of its shape functions, with a fixed frame.
+        spin_ratio: largest transverse spin over its first frequency.
+        gamma: (smallest, largest) eigenvalue of K^-1 K_g of the loads; None if unknown.
+        last_share: largest energy share of the last shape function of a family, and its name.
+        tail: truncated part of the bending energy of the true section loads; for an elastic
+            body, of the deflection of its ends; None if unknown.
+        coupling: share chi of the inertia at its hinge due to the mode with the most energy,
             and this mode.
-        shear: largest error of a bending frequency without shear (and rotary inertia), times the
-            share of the energy that its shape holds; None where the section's radius of gyration is
-            not known.
-        strain: largest strain of its axis and, where the radius of gyration is known, of its
-            outermost fibres; None where it has no length.
-        sideways: loads over those that can buckle a beam in a way for which it has no shapes; None
-            where it has all shapes.
-        said: what is known of the body's model before it moves, and a way out, one sentence each.
-        one_way: it responds to a rigid run, linearly, and is no part of it.
-        tail_of: what `tail` is a part of.
-        unmoved_frame: the frame that deflections count from with fewer shapes, where it is another.
-        unshaped: deformation of a beam in a direction for which it has no shapes, if it matters.
+        shear: largest error of a bending frequency without shear (and rotary inertia), times
+            the energy share of its shape function; None if the section's radius of gyration is
+            unknown.
+        strain: largest strain of its axis and, if the radius of gyration is known, of its
+            outermost fibres; None if it has no length.
+        sideways: ratio of loads to buckling loads of a beam in directions without shape
+            functions; None if it has all shape functions.
+        said: known limitations of the body's model before it moves, and a remedy, one sentence
+            each.
+        one_way: whether it is a one-way body: a linear response to a rigid run, not part of it.
+        tail_of: quantity that `tail` is a part of.
+        unmoved_frame: reference frame of deflections with fewer shape functions, if different.
+        unshaped: deformation of a beam in a direction without shape functions, if significant.
     """
 
     name: str
@@ -92,23 +93,25 @@ class ModelRange:
 
     @property
     def frame_error(self) -> float:
-        """kappa^2 / 2, at most 1: what one frame may err by, as a part of the deflection."""
-        return min(self.slope * self.slope / 2, 1.0)  # ** raises where this is infinite
+        """Relative error of the deflection due to a single frame, kappa^2 / 2, at most 1."""
+        return min(self.slope * self.slope / 2, 1.0)  # ** raises if this is infinite
 
     @property
     def shortening_error(self) -> float:
-        """kappa^2: the same as a part of how far a bent body shortens, which goes with the square
-        of its deflection and so errs by twice as much."""
+        """Relative error of the foreshortening due to a single frame, kappa^2.
+
+        Foreshortening is quadratic in the deflection, so its relative error is twice as large.
+        """
         return self.slope * self.slope
 
     @property
     def load_ratio(self) -> float:
-        """gamma: the larger of the two ratios in size."""
+        """Load ratio gamma: the eigenvalue of larger magnitude."""
         return 0.0 if self.gamma is None else max(abs(x) for x in self.gamma)
 
 
 def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
-    """One entry per flexible body; none for runs without samples and for very many bodies."""
+    """Ranges, one per flexible body; empty for runs without samples and for too many bodies."""
     if not len(flexible.run.t) or not 0 < len(flexible.known) <= MAX_BODIES:
         return ()
     shares = participation_by_body(flexible)
@@ -183,13 +186,15 @@ def _model_range(
 
 
 def _is_squarable(numbers: Array) -> NDArray[np.bool_]:
-    """(n,) where squares of squares of numbers (n, k) are numbers: what runs away grows beyond that
-    and has long said so."""
+    """Mask (n,) of rows of `numbers` (n, k) whose fourth powers do not overflow.
+
+    A diverging run exceeds this long after other findings have reported it.
+    """
     return np.asarray((np.abs(numbers) < _MAX_MAGNITUDE).all(axis=1))
 
 
 def _leading_coupling(motion: Motion, coupling: Array | None) -> tuple[float, str] | None:
-    """chi of the mode that held the most energy."""
+    """Participation chi of the mode with the most energy, and its name."""
     if coupling is None or not len(motion.t):
         return None
     k = int(np.argmax(modal_energy(motion).max(axis=0)))
@@ -199,7 +204,7 @@ def _leading_coupling(motion: Motion, coupling: Array | None) -> tuple[float, st
 def _load_ratio_bounds(
     flexible: FlexibleBodies, name: str, some: NDArray[np.int64]
 ) -> tuple[float, float] | None:
-    """Load ratios; of a linear beam by the shortening that it leaves out."""
+    """Load ratios; for a linear beam, by the foreshortening that it neglects."""
     motion, loads = flexible.motion(name), flexible.end_loads(name)
     second_order_moments = e.second_order_moments(motion.body)
     if second_order_moments is None or not len(some):
@@ -214,7 +219,7 @@ def _load_ratio_bounds(
                 motion.some(part), flexible.gravity, end_loads, second_order_moments
             )
             ratios.append(e.load_ratios(motion.body.K, k_g))
-    except np.linalg.LinAlgError:  # loads beyond what numbers hold
+    except np.linalg.LinAlgError:  # overflow of loads
         return None
     lowest, highest = zip(*ratios, strict=True)
     return min(lowest), max(highest)
@@ -227,8 +232,11 @@ def _section_estimates(
     line: float | None,
     slope: float,
 ) -> tuple[float | None, float | None, UnshapedDeformation | None]:
-    """Estimates from the true section loads of a beam: missed part of the bending energy,
-    `lateral_load_ratio`, and deformation in directions without shapes."""
+    """Estimates from the true section loads of a beam.
+
+    The truncated part of the bending energy, `lateral_load_ratio`, and the deformation in
+    directions without shape functions.
+    """
     motion = flexible.motion(name).some(some)
     inboard_x = flexible.held_place(name)
     x, weights = quadrature_rule(motion.shapes, inboard_x)
@@ -246,8 +254,11 @@ def _section_estimates(
 def missed_bending_energy(
     motion: Motion, places: Array, weights: Array, moment: Array
 ) -> float | None:
-    """Part of the bending energy of `moment` (n, m, 2) that the shapes miss when they are bent
-    most (just after a load was switched on they have not yet followed); None without any."""
+    """Part of the bending energy of `moment` (n, m, 2) that the shape functions miss.
+
+    Taken where the shape functions are bent most: just after a load is applied they have not yet
+    followed. None without bending.
+    """
     shapes = motion.shapes
     sections = shapes.sections(places)
     compliance = weights[:, None] / np.stack([sections.EI_y, sections.EI_z], axis=1)
@@ -265,8 +276,11 @@ def missed_bending_energy(
 
 
 def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int64]) -> float | None:
-    """Part of the deflection of an elastic body's ends, under what they carry, its spin and the
-    inertia of its shapes, that the shapes miss when they are strained most; None without any."""
+    """Part of the deflection of an elastic body's ends that the shape functions miss.
+
+    Under the loads on the ends, the spin of the body and the inertia of its shape functions, taken
+    where these are strained most; None without any.
+    """
     motion = flexible.motion(name).some(some)
     truncation, inboard_end = motion.body.truncation, flexible.held_end(name)
     energies = strain_energy(motion)
@@ -288,12 +302,12 @@ def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int6
 
 # --- rows -----------------------------------------------------------------------------------------
 
-#: Bodies that get rows of their own in the certificate; of more only the extremes are shown.
+#: Largest number of bodies with own rows in the certificate; beyond, only the extremes are shown.
 _MAX_BODY_ROWS = 4
 
 
 def rows(found: Sequence[ModelRange]) -> list[tuple[str, str]]:
-    """Lines of the certificate, (name, text)."""
+    """Rows of the certificate, (name, text)."""
     if len(found) <= _MAX_BODY_ROWS:
         return [row for body_range in found for row in _body_rows(body_range)]
     steepest = max(found, key=lambda body_range: body_range.slope)

@@ -1,9 +1,9 @@
-"""Momentum of bodies, and the rigid motion that would have it (rigid-body equivalent velocities).
+"""Momentum of bodies, and rigid-body equivalent velocities.
 
-V_RB = p / m and w_RB = I_G^-1 L_G: the velocity and spin of the undeformed body if it moved as one
-with this momentum p and this angular momentum L_G about the mass centre.  However the floating
-frame is chosen, V_RB is the velocity of the mass centre; in free flight V_RB follows gravity, and
-w_RB is the steady part of the rotation, while frames swing with the vibration.
+V_RB = p / m and w_RB = I_G^-1 L_G: velocity and spin of the undeformed body in a rigid motion with
+the same momentum p and angular momentum L_G about the mass centre. For any choice of the floating
+frame, V_RB is the velocity of the mass centre; in free flight V_RB follows gravity, and w_RB is the
+steady part of the rotation, while frames oscillate with the vibration.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .motion import Motion
 
 
-#: Part of the largest moment of inertia below which there is none.
+#: Moments of inertia below this part of the largest count as zero.
 _ZERO_INERTIA_RATIO = 1e-12
 
 _UPPER_TRIANGLE = np.triu_indices(6)
@@ -35,8 +35,11 @@ _UPPER_TRIANGLE = np.triu_indices(6)
 
 @dataclass(frozen=True)
 class Momentum:
-    """Of one body over n samples, inertial axes: linear (n, 3) kg*m/s, angular (n, 3) kg*m2/s about
-    the mass centre, the centre (n, 3) m, equivalent velocity (n, 3) m/s and spin (n, 3) rad/s."""
+    """Momentum of one body over n samples, inertial axes.
+
+    linear (n, 3) kg*m/s, angular (n, 3) kg*m2/s about the mass centre, the centre (n, 3) m,
+    equivalent velocity (n, 3) m/s and spin (n, 3) rad/s.
+    """
 
     linear: Array
     angular: Array
@@ -46,14 +49,14 @@ class Momentum:
 
 
 class Momenta:
-    """Momenta of bodies, made when they are asked for."""
+    """Momenta of bodies, computed on first use."""
 
     def __init__(self, flexible: FlexibleBodies) -> None:
         self.flexible, self.observed = flexible, flexible.observed
         self._known: dict[str, Momentum] = {}
 
     def of(self, name: str) -> Momentum:
-        """SceneError for a body that is not there, and for one without mass."""
+        """Momentum of one body; SceneError for an unknown body, and for one without mass."""
         references = self.observed.references
         canonical_name = references.canonical(name)
         if canonical_name is None or references.bodies.find(canonical_name) is None:
@@ -64,7 +67,7 @@ class Momenta:
         return self._known[canonical_name]
 
     def _of_rigid(self, name: str) -> Momentum:
-        """A rigid body moves as it is: momentum of its inertia matrix with its own motion."""
+        """Momentum of a rigid body from its inertia matrix and its own motion."""
         mass, center, inertia = self._inertia(name)
         points = self.observed.node(name)
         rotation = points[:, 15:24].reshape(-1, 3, 3)
@@ -74,8 +77,10 @@ class Momenta:
         return Momentum(mass * velocity, angular, points[:, 0:3] + arm, velocity, spin)
 
     def _inertia(self, name: str) -> tuple[float, Array, Array]:
-        """Mass, mass centre in the user's axes and inertia about it in them, from the kernel that
-        the engine takes them from."""
+        """Mass, mass centre and inertia about it in the user's axes.
+
+        Evaluated by the kernel from which the engine obtains them.
+        """
         packed = self.observed.apart.engine.packed
         body_index, axes, offset = packed.end(name)
         body, ffi, numbers = packed.system.body(body_index), packed.ffi, np.zeros(21)
@@ -98,7 +103,7 @@ class Momenta:
         return equivalent_momentum(motion, linear, about_origin, first / motion.body.mass)
 
     def _of_points(self, motion: Motion) -> Momentum:
-        """A body whose mass stands in points: theirs summed up."""
+        """Momentum of a body with mass points, summed over the points."""
         name, parts = motion.body.name, []
         for k in range(len(motion.body.points)):
             parts.append(self._of_rigid(f"{name}/point {k + 1}"))
@@ -115,8 +120,11 @@ class Momenta:
 
 
 def shift_inertia(matrix: Array, axes: Array, offset: Array) -> tuple[Array, Array]:
-    """Mass centre (3,) and inertia (3, 3) about it in the user's axes, from an inertia matrix in
-    the engine's: `axes` (3, 3) and `offset` (3,) are those of a probe of the user's axes."""
+    """Mass centre (3,) and inertia (3, 3) about it in the user's axes.
+
+    `matrix` is an inertia matrix in the engine's axes; `axes` (3, 3) and `offset` (3,) are those of
+    a probe of the user's axes.
+    """
     mass = matrix[0, 0]
     center = np.array([matrix[5, 1], matrix[3, 2], matrix[4, 0]]) / mass
     inertia = matrix[3:, 3:] + mass * (tilde(center) @ tilde(center))
@@ -126,10 +134,11 @@ def shift_inertia(matrix: Array, axes: Array, offset: Array) -> tuple[Array, Arr
 def equivalent_momentum(
     motion: Motion, linear: Array, about_origin: Array, center: Array
 ) -> Momentum:
-    """Equivalent velocity and spin from the momentum (n, 3), the moment of momentum about the
-    frame's origin and the mass centre, frame axes.
+    """Momentum with equivalent velocity and spin, from sums in frame axes.
 
-    About an axis without inertia (that of a beam without polar inertia) the spin is given as zero.
+    `linear` is the momentum (n, 3), `about_origin` the moment of momentum about the frame's origin
+    and `center` the mass centre. About an axis without inertia (that of a beam without polar
+    inertia) the spin is zero.
     """
     mass, inertia = undeformed_inertia(motion.body)
     angular = about_origin - np.cross(center, linear)
@@ -160,13 +169,15 @@ def undeformed_inertia(body: ModalBody) -> tuple[float, Array]:
     return mass, np.trace(inner) * np.eye(3) - inner + point_inertia
 
 
-#: Numbers of one batch of samples, about 30 MB an array.
+#: Numbers in one batch of samples, about 30 MB per array.
 _MAX_BATCH_NUMBERS = 2**22
 
 
 def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
-    """Linear momentum in kg*m/s, moment of momentum about the frame's origin in kg*m2/s and first
-    moment of the mass in kg*m, (n, 3) each, frame axes; by the kernel `momentum`."""
+    """Momentum, moment of momentum and first mass moment (n, 3) each, frame axes.
+
+    Units kg*m/s, kg*m2/s about the frame's origin and kg*m; evaluated by the kernel `momentum`.
+    """
     body, parts = motion.body, []
     rows = max(1, _MAX_BATCH_NUMBERS // max(1, body.n**2 * 8))
     for first in range(0, len(motion.t), rows):
@@ -184,7 +195,7 @@ def frame_momentum(motion: Motion) -> tuple[Array, Array, Array]:
 
 
 def _inertia_from_upper(upper: Array) -> Array:
-    """(n, 6, 6) symmetric matrices from their upper triangles (n, 21), row by row."""
+    """Symmetric matrices (n, 6, 6) from their upper triangles (n, 21), row by row."""
     full = np.zeros((len(upper), 6, 6))
     full[:, *np.triu_indices(6)] = upper
     return full + np.swapaxes(np.triu(full, 1), 1, 2)

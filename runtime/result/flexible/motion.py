@@ -1,9 +1,9 @@
-"""What a flexible body did over a run: its floating frame, its modal coordinates, its sections.
+"""Motion of a flexible body over a run: floating frame, modal coordinates, sections.
 
-Arrays have the time first.  A section at x of a beam stands at r0 + phi eta - 1/2 eta^T g eta
-against the floating frame, turned by exp(Psi~), Psi = theta eta - 1/2 eta^T h eta (the kernel
-`section`); s is the displacement along the beam, v and w across, to first order
-Psi = (twist, -w', v').
+The first array axis is time. A section at x of a beam is displaced by r0 + phi eta - 1/2 eta^T g
+eta in the floating frame and rotated by exp(Psi~), Psi = theta eta - 1/2 eta^T h eta (the kernel
+`section`). With s the axial and v, w the transverse displacements, to first order Psi = (twist,
+-w', v').
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
 
 
-#: A section may lie this part of the length beyond the ends: rounding of the user's numbers.
+#: Relative length by which a section may exceed the ends: rounding of the user's numbers.
 _LENGTH_TOLERANCE = 1e-9
 
 
@@ -33,7 +33,7 @@ class Motion:
     """Motion of one flexible body over n samples.
 
     Attributes:
-        body: its numbers.
+        body: its modal data.
         t: (n,) s.
         eta, etad, etadd: (n, modes) modal coordinates, speeds and accelerations.
         position: (n, 3) m, origin of the floating frame, inertial axes.
@@ -55,44 +55,44 @@ class Motion:
     spin_rate: Array
 
     def some(self, samples: Any) -> Motion:
-        """The same at some samples: a slice or indices."""
+        """Motion at some of the samples: a slice or indices."""
         arrays = {k: v[samples] for k, v in vars(self).items() if isinstance(v, np.ndarray)}
         sampled = {name: arrays[name] for name in _ARRAYS}
         return Motion(self.body, **sampled)
 
     @property
     def shapes(self) -> BeamShapes:
-        """Shapes along the axis of a beam; SceneError for a body that has none."""
+        """Shape functions along the axis of a beam; SceneError for a body without any."""
         return shapes_of(self.body, "what is along its axis")
 
-    # --- the floating frame in its own axes -----------------------------------------------------
+    # --- floating frame in its own axes ---------------------------------------------------------
 
     def inward(self, vectors: Array) -> Array:
-        """(n, 3) or (n, m, 3) inertial components -> frame components."""
+        """Frame components of inertial components (n, 3) or (n, m, 3)."""
         return np.einsum("tji,t...j->t...i", self.rotation, vectors)
 
     def outward(self, vectors: Array) -> Array:
-        """(n, 3) or (n, m, 3) frame components -> inertial components."""
+        """Inertial components of frame components (n, 3) or (n, m, 3)."""
         return np.einsum("tij,t...j->t...i", self.rotation, vectors)
 
     @cached_property
     def frame_velocity(self) -> Array:
-        """(n, 3) velocity of the frame's origin, frame axes."""
+        """Velocity (n, 3) in m/s of the frame's origin, frame axes."""
         return self.inward(self.velocity)
 
     @cached_property
     def frame_spin(self) -> Array:
-        """(n, 3) angular velocity of the frame, frame axes."""
+        """Angular velocity (n, 3) in rad/s of the frame, frame axes."""
         return self.inward(self.spin)
 
     @cached_property
     def frame_acceleration(self) -> Array:
-        """(n, 3) acceleration of the frame's origin, frame axes."""
+        """Acceleration (n, 3) in m/s2 of the frame's origin, frame axes."""
         return self.inward(self.acceleration)
 
     @cached_property
     def frame_spin_rate(self) -> Array:
-        """(n, 3) angular acceleration of the frame, frame axes."""
+        """Angular acceleration (n, 3) in rad/s2 of the frame, frame axes."""
         return self.inward(self.spin_rate)
 
 
@@ -102,11 +102,11 @@ _ARRAYS = (
 )  # fmt: skip
 
 
-# --- places along a beam --------------------------------------------------------------------------
+# --- sections along a beam ------------------------------------------------------------------------
 
 
 def shapes_of(body: ModalBody, what: str) -> BeamShapes:
-    """Shapes of a beam along its axis; SceneError for a body that has no axis."""
+    """Shape functions of a beam along its axis; SceneError for a body without an axis."""
     if body.shapes is None:
         raise SceneError(
             f'"{body.name}": {what} is known along beams; this body is elastic by its matrices: '
@@ -116,7 +116,7 @@ def shapes_of(body: ModalBody, what: str) -> BeamShapes:
 
 
 def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
-    """x in m as (m,); SceneError for a place off the beam or a number that is none."""
+    """Positions x in m as (m,); SceneError for a position off the beam or not a number."""
     length = float(shapes_of(body, what).length)
     places = np.atleast_1d(finite_array(f'{what} of "{body.name}": x', x))
     if places.ndim != 1:
@@ -133,14 +133,13 @@ def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
 
 
 def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
-    """Values of the shapes at x (m,), kept for the next who asks for the same places, if they are
-    not too many."""
+    """Values of the shape functions at x (m,), cached unless there are too many."""
     if len(places) * shapes.n > _MAX_CACHED_VALUES:
         return shapes.at(places)
     return _cached_values(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
 
 
-#: Values of shapes at sections that are kept.
+#: Largest number of cached shape function values at sections.
 _MAX_CACHED_VALUES = 2**17
 
 
@@ -150,20 +149,22 @@ def _cached_values(shapes: BeamShapes, places: bytes) -> ShapeValues:
 
 
 def deflection(motion: Motion, places: Array) -> Array:
-    """(n, m, 3) elastic displacement in m of the axis at x, frame axes, second order included."""
+    """Elastic displacement (n, m, 3) in m of the axis at x, frame axes, second order included."""
     first = first_order_field(values_at(motion.shapes, places).phi, motion.eta)
     return first - 0.5 * second_order_motion(motion, places, "eta", "eta")[..., :3]
 
 
 def rotation_vectors(motion: Motion, places: Array) -> Array:
-    """(n, m, 3) rotation vectors in rad of the sections against the frame, second order included:
-    to first order twist, -w', v'."""
+    """Rotation vectors (n, m, 3) in rad of the sections in the frame, second order included.
+
+    To first order twist, -w', v'.
+    """
     first = first_order_field(values_at(motion.shapes, places).theta, motion.eta)
     return first - 0.5 * second_order_motion(motion, places, "eta", "eta")[..., 3:]
 
 
 def first_order_field(field: Array, modal: Array) -> Array:
-    """(n, m, 3) of a field (m, 3, modes) and modal coordinates or their rates (n, modes)."""
+    """Field (n, m, 3) from (m, 3, modes) and modal coordinates or their rates (n, modes)."""
     flat = field.reshape(-1, field.shape[-1])
     return np.asarray((modal @ flat.T).reshape(len(modal), *field.shape[:-1]))
 
@@ -171,8 +172,11 @@ def first_order_field(field: Array, modal: Array) -> Array:
 def second_order_motion(
     motion: Motion, places: Array, a: str, b: str, carried: bool = False
 ) -> Array:
-    """(n, m, 6) displacement and rotation a^T g b of second order at x, for a and b among eta, etad
-    and etadd; zeros of a linear beam; `carried` as in `SecondOrder`."""
+    """Second-order displacement and rotation (n, m, 6) at x: a^T g b.
+
+    `a` and `b` are among eta, etad and etadd. Zeros for a linear beam; `carried` as in
+    `SecondOrder`.
+    """
     if not motion.shapes.stiffening:
         return np.zeros((len(motion.t), len(places), 6))
     field = motion.shapes.second_order
@@ -180,19 +184,19 @@ def second_order_motion(
 
 
 def slope(motion: Motion, places: Array) -> Array:
-    """(n, m, 2) slopes v', w' of the axis against the frame's x axis."""
+    """Slopes (n, m, 2) of the axis, v' and w', relative to the frame's x axis."""
     rotation = rotation_vectors(motion, places)
     return np.stack([rotation[:, :, 2], -rotation[:, :, 1]], axis=2)
 
 
 def curvature(motion: Motion, places: Array) -> Array:
-    """(n, m, 2) curvature in 1/m about y, -w'', and about z, v''."""
+    """Curvature (n, m, 2) in 1/m about y, -w'', and about z, v''."""
     curvature_of_modes = values_at(motion.shapes, places).curvature[:, 1:]
     return np.einsum("mak,tk->tma", curvature_of_modes, motion.eta)
 
 
 def deflected_axis(motion: Motion, places: Array) -> Array:
-    """(n, m, 3) inertial positions in m of the deflected axis."""
+    """Inertial positions (n, m, 3) in m of the deflected axis."""
     at_rest = np.zeros((len(places), 3))
     at_rest[:, 0] = places
     local = at_rest + deflection(motion, places)
@@ -200,9 +204,9 @@ def deflected_axis(motion: Motion, places: Array) -> Array:
 
 
 def section_rotations(turned: Array) -> Array:
-    """(..., 3, 3) rotations exp(Psi~) of rotation vectors (..., 3), section to frame axes.
+    """Rotations (..., 3, 3), exp(Psi~), of rotation vectors (..., 3), section to frame axes.
 
-    1 + sinc(t) Psi~ + 1/2 sinc(t/2)^2 Psi~ Psi~, t = |Psi|: no small angle needs a case of its own.
+    1 + sinc(t) Psi~ + 1/2 sinc(t/2)^2 Psi~ Psi~, t = |Psi|: no special case for small angles.
     """
     angle = np.linalg.norm(turned, axis=-1)[..., None, None]
     skew = tilde(turned)
@@ -212,7 +216,7 @@ def section_rotations(turned: Array) -> Array:
 
 
 def tilde(v: Array) -> Array:
-    """(..., 3, 3) matrices of the cross product with v (..., 3)."""
+    """Cross-product matrices (..., 3, 3) of v (..., 3)."""
     zero = np.zeros(v.shape[:-1])
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
     rows = [zero, -z, y, z, zero, -x, -y, x, zero]
@@ -220,14 +224,14 @@ def tilde(v: Array) -> Array:
 
 
 def elastic_moment(motion: Motion, places: Array) -> Array:
-    """(n, m, 2) bending moments in N*m of the curvature of the shapes: about y and about z."""
+    """Bending moments (n, m, 2) in N*m of the curvature of the shapes, about y and about z."""
     sections = motion.shapes.sections(places)
     stiffness = np.stack([sections.EI_y, sections.EI_z], axis=1)
     return curvature(motion, places) * stiffness
 
 
 def elastic_force(motion: Motion, places: Array) -> Array:
-    """(n, m) axial force EA s' in N of the axial shapes; SceneError for a beam without them."""
+    """Axial force (n, m), EA s' in N, of the axial shapes; SceneError for a beam without them."""
     values = values_at(motion.shapes, places)
     if not values.stretch.any():
         raise SceneError(

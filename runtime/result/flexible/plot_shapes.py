@@ -1,6 +1,6 @@
-"""Pictures of flexible bodies: deflected shapes over time, deflection along a beam, modal energies.
+"""Plots of flexible bodies: deflected shapes, deflection along a beam, modal energies.
 
-The functions draw arrays into one matplotlib axes; nothing here knows a result.
+The functions draw arrays into one matplotlib axes and do not depend on results.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 
-#: Shapes of a strip, and the colour map of their times: dark to bright, readable in grey.
+#: Number of shapes in a strip, and the colour map of their times: dark to bright, readable in grey.
 MAX_SHAPES, _COLOUR_MAP = 12, "viridis"
 
 #: The bright end of the map is too pale on white.
@@ -28,13 +28,13 @@ _REST_STYLE: dict[str, Any] = {
 
 _RIGID_STYLE: dict[str, Any] = {"color": "#b9b9b9", "linewidths": 1.4, "zorder": 2}
 
-#: An inertial direction is named if a picture's axis lies along it up to this.
+#: An inertial direction is named if an axis of the plot is aligned with it within this.
 _MIN_ALIGNMENT = 1 - 1e-6
 
 
 @dataclass(frozen=True)
 class Strip:
-    """Shapes of one body at k times: deflected and at rest in its floating frame, (k, m, 3) m."""
+    """Shapes of one body at k times: deflected and undeformed in its frame, (k, m, 3) m."""
 
     name: str
     times: Array
@@ -43,7 +43,7 @@ class Strip:
 
 
 def shape_samples(t: Array, count: int = MAX_SHAPES) -> NDArray[np.int64]:
-    """Indices of `count` samples spread evenly over the time, first and last among them."""
+    """Indices of `count` samples spread evenly over time, including the first and last."""
     targets = np.linspace(t[0], t[-1], max(2, count))
     right = np.clip(np.searchsorted(t, targets), 1, max(1, len(t) - 1))
     left = right - 1
@@ -54,10 +54,10 @@ def shape_samples(t: Array, count: int = MAX_SHAPES) -> NDArray[np.int64]:
 
 
 def principal_plane(points: Array) -> tuple[Array, Array]:
-    """Two unit vectors (3,) that span the plane in which points (..., 3) spread most.
+    """Unit vectors (3,), two, spanning the plane in which points (..., 3) spread most.
 
-    A coordinate plane where the points lie close to one, so that a planar scene is drawn as it was
-    written; else the principal plane.  Points that are not finite do not count.
+    A coordinate plane if the points are close to one, so that a planar scene is drawn as written;
+    otherwise the principal plane. Points that are not finite are ignored.
     """
     cloud = _finite_points(points.reshape(-1, 3))
     if not len(cloud):
@@ -66,7 +66,7 @@ def principal_plane(points: Array) -> tuple[Array, Array]:
     spread = np.sqrt(np.mean(cloud**2, axis=0))
     normal_index = int(
         np.argmin(spread[::-1])
-    )  # of equal ones the last: y up, z towards the reader
+    )  # the last of equal ones: y up, z towards the reader
     normal_index = 2 - normal_index
     if (
         spread[normal_index] <= _MAX_FLATNESS * np.sort(spread)[1]
@@ -78,7 +78,7 @@ def principal_plane(points: Array) -> tuple[Array, Array]:
     return rows[0] * _dominant_sign(rows[0]), rows[1] * _dominant_sign(rows[1])
 
 
-#: Points count as lying in a plane if their spread across it is this part of that within.
+#: Points count as planar if their spread normal to the plane is at most this part of that within.
 _MAX_FLATNESS = 0.3
 
 
@@ -87,7 +87,7 @@ def _dominant_sign(v: Array) -> float:
 
 
 def direction_label(v: Array) -> str:
-    """x, y or z for a unit vector along that axis; else its components."""
+    """Label x, y or z of a unit vector along that axis; otherwise its components."""
     k = int(np.argmax(np.abs(v)))
     if v[k] > _MIN_ALIGNMENT:
         return "xyz"[k]
@@ -95,7 +95,7 @@ def direction_label(v: Array) -> str:
 
 
 def _finite_points(points: Array) -> Array:
-    """Those of the points (n, 3) that are numbers: samples may be beyond the model."""
+    """Finite points among (n, 3): samples may be beyond the model."""
     return points[np.isfinite(points).all(axis=1)]
 
 
@@ -111,14 +111,14 @@ def strip_height(strips: list[Strip]) -> float:
     )
 
 
-#: Inches: axes of a strip, least and most height of its axes, room for its labels.
+#: Inches: width of a strip's axes, their least and largest height, height of the labels.
 _AXES_WIDTH, _MIN_HEIGHT, _MAX_HEIGHT, _LABEL_HEIGHT = 5.6, 1.2, 4.6, 0.6
 
 
 def draw_strip(
     figure: Any, axis: Any, strips: list[Strip], rigid: list[Array], ground: list[Array]
 ) -> None:
-    """Deflected shapes coloured by time, dashed where the undeformed bodies would lie.
+    """Draw deflected shapes coloured by time, and undeformed bodies dashed.
 
     `rigid` are lines (k, 2, 3) of rigid bodies at the same times, `ground` points (3,) to mark.
     """
@@ -152,7 +152,7 @@ def draw_strip(
 def draw_deflections(
     figure: Any, axis: Any, x: Array, times: Array, across: Array, name: str
 ) -> None:
-    """Deflection (k, m) in m along a beam at k times, against the straight axis of its frame."""
+    """Draw deflections (k, m) in m along a beam at k times, with the undeformed axis."""
     from matplotlib.collections import LineCollection
 
     colours, norm = _time_colours(times)
@@ -167,7 +167,7 @@ def draw_deflections(
 
 
 def _time_colours(times: Array) -> tuple[Any, Any]:
-    """Colour map of the times, and what takes times to it."""
+    """Colour map of the times, and the normalisation of times for it."""
     import matplotlib as mpl
 
     colour_map = mpl.colormaps[_COLOUR_MAP]
@@ -186,7 +186,7 @@ def _draw_colour_bar(figure: Any, axis: Any, colours: Any, norm: Any) -> None:
 
 
 def draw_energies(axis: Any, t: Array, energies: Array, modes: tuple[str, ...], name: str) -> None:
-    """Shares (n, modes) in J of the modes over time, one upon the other, the largest below."""
+    """Draw the energy shares (n, modes) in J over time as stacked layers, the largest lowest."""
     order = np.argsort(-energies.max(axis=0, initial=0.0), kind="stable")[:_MAX_LAYERS]
     other_modes = np.setdiff1d(np.arange(len(modes)), order)
     layers = [energies[:, k] for k in order]
@@ -204,6 +204,6 @@ def draw_energies(axis: Any, t: Array, energies: Array, modes: tuple[str, ...], 
     )
 
 
-#: Modes with a layer of their own.
+#: Largest number of modes with a separate layer.
 _MAX_LAYERS = 6
 _LAYER_COLOURS = ("#0072B2", "#56B4E9", "#009E73", "#E69F00", "#D55E00", "#CC79A7", "#bdbdbd")

@@ -1,4 +1,4 @@
-"""Results of flexible bodies, and momenta of any body: the part of `Result` that is about them."""
+"""Results of flexible bodies and momenta of any body, as a part of `Result`."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
     from .motion import Motion
 
 
-#: Where bending moments and axial forces come from.
+#: Sources of bending moments and axial forces.
 SOURCES = ("equilibrium", "shapes")
 
 
 class FlexibleResults:
     """Quantities along beams and of flexible bodies; part of `Result`.
 
-    `x` is a place along the beam in m, an array of m places, or the name of an end ("tip").  For
-    one place the arrays are (n, ...), for several (n, m, ...).  SceneError for a place off the
-    beam, a body that is not there, and a body that has no such quantity.
+    `x` is a position along the beam in m, an array of m positions, or the name of an end ("tip").
+    For one position the arrays are (n, ...), for several (n, m, ...). SceneError for a position off
+    the beam, an unknown body, and a body without such a quantity.
     """
 
     model: CompiledScene
@@ -70,13 +70,17 @@ class FlexibleResults:
     # --- along beams ----------------------------------------------------------------------------
 
     def deflection(self, body: str, x: ArrayLike | str) -> Array:
-        """Elastic displacement (n, 3) in m of the axis at x against the floating frame, in its
-        axes; with the shortening that bending brings, unless the beam has stiffening = false."""
+        """Elastic displacement (n, 3) in m of the axis at x in the floating frame, frame axes.
+
+        Includes foreshortening by bending, unless the beam has stiffening = false.
+        """
         return self._along(body, x, "deflection", observe.deflection)
 
     def slope(self, body: str, x: ArrayLike | str) -> Array:
-        """Slopes (n, 2) of the axis at x against the floating frame: v' and w', of the deflections
-        along y and z."""
+        """Slopes (n, 2) of the axis at x relative to the floating frame, v' and w'.
+
+        v and w are the deflections along y and z.
+        """
         return self._along(body, x, "slope", observe.slope)
 
     def curvature(self, body: str, x: ArrayLike | str) -> Array:
@@ -84,20 +88,26 @@ class FlexibleResults:
         return self._along(body, x, "curvature", observe.curvature)
 
     def section_force(self, body: str, x: ArrayLike | str) -> Array:
-        """Force (n, 3) in N of the part beyond x on the part before it, in the axes of the section:
-        axial (tension positive), shear along y and z.  From equilibrium."""
+        """Section force (n, 3) in N at x, section axes, from equilibrium.
+
+        Force of the part beyond x on the part before it: axial (tension positive), shear along y
+        and z.
+        """
         return self._along(body, x, "section_force", lambda m, p: self._loads(m, p)[0])
 
     def section_moment(self, body: str, x: ArrayLike | str) -> Array:
-        """Moment (n, 3) in N*m of the part beyond x on the part before it about the deflected axis,
-        in the axes of the section: torque, bending about y and z.  From equilibrium."""
+        """Section moment (n, 3) in N*m at x, section axes, from equilibrium.
+
+        Moment of the part beyond x on the part before it, about the deflected axis: torque, bending
+        about y and z.
+        """
         return self._along(body, x, "section_moment", lambda m, p: self._loads(m, p)[1])
 
     def bending_moment(self, body: str, x: ArrayLike | str, source: str = "equilibrium") -> Array:
         """Bending moments (n, 2) in N*m at x about y and z, of the part beyond on the part before.
 
-        From "equilibrium": inertia, gravity and loads of the free side added up.  From "shapes":
-        -EI_y w'' and EI_z v'', which cannot be better than the shapes' curvature.
+        From "equilibrium": sum of inertia, gravity and loads of the free side. From "shapes": -EI_y
+        w'' and EI_z v'', no more accurate than the curvature of the shape functions.
         """
         if _require_source(source) == "equilibrium":
             return self.section_moment(body, x)[..., 1:]
@@ -107,7 +117,7 @@ class FlexibleResults:
         """Axial force (n,) in N at x, tension positive.
 
         From "equilibrium" as `section_force`, also where the axis does not stretch; from "shapes"
-        EA s', of beams with axial modes.
+        EA s', for beams with axial modes.
         """
         if _require_source(source) == "equilibrium":
             return self.section_force(body, x)[..., 0]
@@ -127,7 +137,7 @@ class FlexibleResults:
         )  # fmt: skip
 
     def shape(self, body: str, points: int = 41) -> Array:
-        """Inertial positions (n, points, 3) in m of the deflected axis at evenly spaced places."""
+        """Inertial positions (n, points, 3) in m of the deflected axis, evenly spaced."""
         if points < 2:
             raise SceneError(f"shape: points = {points}: expected 2 or more")
         motion = self._flexible.motion(body, "shape")
@@ -137,8 +147,10 @@ class FlexibleResults:
     # --- of a flexible body ---------------------------------------------------------------------
 
     def modal_energy(self, body: str) -> Array:
-        """Energy (n, modes) in J of each mode: strain, and kinetic of the motion against the
-        floating frame: 1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k."""
+        """Energy (n, modes) in J by mode: strain energy plus kinetic energy in the floating frame.
+
+        1/2 eta_k (K eta)_k + 1/2 etad_k (M etad)_k.
+        """
         return observe_energy.modal_energy(self._flexible.motion(body, "modal_energy"))
 
     def strain_energy(self, body: str) -> Array:
@@ -156,16 +168,19 @@ class FlexibleResults:
         return self._momenta.of(body).angular
 
     def center_of_mass(self, body: str) -> Array:
-        """Position (n, 3) in m of the mass centre of one body, deformed as it is."""
+        """Position (n, 3) in m of the mass centre of one body in its deformed shape."""
         return self._momenta.of(body).center
 
     def equivalent_velocity(self, body: str) -> Array:
-        """Velocity (n, 3) in m/s that a rigid body of this mass and momentum would have, p/m."""
+        """Velocity (n, 3) in m/s of a rigid body of the same mass and momentum, p/m."""
         return self._momenta.of(body).velocity
 
     def equivalent_spin(self, body: str) -> Array:
-        """Angular velocity (n, 3) in rad/s of a rigid body of this angular momentum about the mass
-        centre, with the inertia of the undeformed body in the axes of the floating frame."""
+        """Angular velocity (n, 3) in rad/s of a rigid body of the same angular momentum.
+
+        About the mass centre, with the inertia of the undeformed body in the axes of the floating
+        frame.
+        """
         return self._momenta.of(body).spin
 
 

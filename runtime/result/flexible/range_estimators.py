@@ -1,7 +1,8 @@
 """Estimators of how far a flexible body left the validity range of its model.
 
-Per body: slope kappa, spin ratio, stiffening gamma, share of the last shape, bending that the
-shapes could not follow, coupling chi, shear.  Thresholds and reasons stand beside the numbers.
+Per body: slope kappa, spin ratio, stiffening gamma, share of the last shape function, bending
+energy that the shape functions miss, coupling chi, shear. Thresholds and their reasons are given
+next to the values.
 """
 
 from __future__ import annotations
@@ -23,22 +24,24 @@ if TYPE_CHECKING:
     from ...flexible.modal_body import ModalBody
 
 
-#: What the part that shapes miss is a part of: of a beam, and of an elastic body.
+#: Quantity that the truncated part refers to: for a beam, and for an elastic body.
 BENDING_ENERGY, DEFLECTION = "bending energy", "deflection of its ends"
 
-#: Sections of a beam that are looked at.
+#: Sections of a beam that are examined.
 SECTION_COUNT = 33
 
 
 def max_slope(motion: Motion) -> float:
-    """kappa = max |phi' eta|: slope of the deflected axis against the frame; of an elastic body the
-    largest rotation of an end across its frame."""
+    """Largest slope kappa = max |phi' eta| of the deflected axis relative to the frame.
+
+    For an elastic body, the largest rotation of an end transverse to its frame.
+    """
     return max((float(np.max(np.hypot(t[..., 1], t[..., 2]), initial=0.0))
                 for t in _rotation_vectors(motion)), default=0.0)  # fmt: skip
 
 
 def max_rotation(motion: Motion) -> float:
-    """max |Psi| in rad of a section or an end against the frame, twist included."""
+    """Largest rotation max |Psi| in rad of a section or an end in the frame, twist included."""
     return max((float(np.max(np.linalg.norm(t, axis=-1), initial=0.0))
                 for t in _rotation_vectors(motion)), default=0.0)  # fmt: skip
 
@@ -53,12 +56,12 @@ def _rotation_vectors(motion: Motion) -> list[Array]:
 
 
 def has_second_order_terms(body: ModalBody) -> bool:
-    """Whether second-order displacements are in a body's kinematics."""
+    """Whether the kinematics of a body include second-order displacements."""
     return bool(np.any(body.G)) if body.shapes is None else bool(body.shapes.stiffening)
 
 
 def transverse_spin(motion: Motion) -> float:
-    """Largest spin in rad/s of the frame about what lies across a beam; about any axis else.
+    """Largest spin in rad/s of the frame transverse to a beam; of other bodies, about any axis.
 
     Spin about a beam's own axis neither stretches nor bends it.
     """
@@ -68,8 +71,11 @@ def transverse_spin(motion: Motion) -> float:
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """Moments of the second-order displacement: G (3, n, n) = int rho g_a, X (3, 3, n, n) =
-    int rho r0_a g_b; displacement and rotation of second order (6, n, n) at the ends."""
+    """Moments of the second-order displacement, and its values at the ends.
+
+    G (3, n, n) = int rho g_a, X (3, 3, n, n) = int rho r0_a g_b; displacement and rotation of
+    second order (6, n, n) at the ends.
+    """
 
     G: Array
     X: Array
@@ -77,8 +83,10 @@ class SecondOrder:
 
 
 def second_order_moments(body: ModalBody) -> SecondOrder | None:
-    """Of a beam what bending and twist bring, also where its kinematics leave it out; of another
-    body what it has; None if it has nothing."""
+    """Second-order moments of a body; None if it has none.
+
+    For a beam, those due to bending and twist, even if its kinematics neglect them.
+    """
     if body.shapes is None or body.shapes.stiffening:
         ends = {name: port.second_order for name, port in body.ports.items()}
         has_terms = np.any(body.G) or any(np.any(g) for g in ends.values())
@@ -96,12 +104,12 @@ def second_order_moments(body: ModalBody) -> SecondOrder | None:
 def stiffness_from_loads(
     motion: Motion, gravity: Array, ports: dict[str, tuple[Array, Array]], second: SecondOrder
 ) -> Array:
-    """(n, modes, modes) K_g of the loads on the undeformed body.
+    """Geometric stiffness K_g (n, modes, modes) of the loads on the undeformed body.
 
-    K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port) + M_a h_a(port), with the acceleration
-    a = a_o + W r0 of the rigid motion, W = wd~ + w~ w~, and g, h the displacement and rotation of
+    K_g = - int rho (a - g)_a g_a + sum_ports F_a g_a(port) + M_a h_a(port), with the acceleration a
+    = a_o + W r0 of the rigid motion, W = wd~ + w~ w~, and g, h the displacement and rotation of
     second order: for a beam (w_y^2 + w_z^2) G1 - a_x G0 + (end load, as a tension) G(L), and the
-    work of loads across it on its twist.  `ports` are forces in N and moments in N*m (n, 3) on the
+    work of transverse loads on its twist. `ports` are forces in N and moments in N*m (n, 3) on the
     ends, inertial axes.
     """
     force = motion.frame_acceleration - motion.inward(np.broadcast_to(gravity, motion.spin.shape))
@@ -116,9 +124,9 @@ def stiffness_from_loads(
 
 
 def load_ratios(stiffness: Array, from_loads: Array) -> tuple[float, float]:
-    """(smallest, largest) eigenvalue of K^-1 K_g over the samples.
+    """Smallest and largest eigenvalue of K^-1 K_g over the samples.
 
-    gamma is the larger of the two in size; at -1 the loads alone buckle the body.
+    gamma is the one of larger magnitude; at -1 the loads alone buckle the body.
     """
     whitened = np.linalg.inv(np.linalg.cholesky(stiffness))
     whitened_loads = whitened @ from_loads @ whitened.T
@@ -127,10 +135,10 @@ def load_ratios(stiffness: Array, from_loads: Array) -> tuple[float, float]:
 
 
 def last_shape_share(motion: Motion) -> tuple[float, str]:
-    """Largest share of the energy of all modes that a family's last shape held, and its name.
+    """Largest energy share of the last shape function of a family, and its name.
 
-    Families are the mode names without their number: y, z, twist, axial.  A family that holds less
-    than a thousandth of the energy throughout does not count, nor one with a single shape.
+    Families are the mode names without their number: y, z, twist, axial. A family that always has
+    less than a thousandth of the energy does not count, nor one with a single shape function.
     """
     energy = modal_energy(motion)
     total = float(np.max(energy.sum(axis=1), initial=0.0))
@@ -148,15 +156,14 @@ def last_shape_share(motion: Motion) -> tuple[float, str]:
 
 
 def has_bending_shapes(body: ModalBody, plane: str) -> bool:
-    """Whether a beam has shapes of deflection along y or z."""
+    """Whether a beam has shape functions of deflection along y or z."""
     return any(name.startswith(plane) for name in body.modes)
 
 
 def gyration_radii(shapes: BeamShapes, x: Array) -> Array:
-    """(3, m) radii of gyration in m of the sections at x, about their y and z axes in rows 1 and 2;
-    zero where they are not known.
+    """Radii of gyration (3, m) in m of the sections at x, about y and z in rows 1 and 2.
 
-    From rotary inertia, else from E I / E A, else from half the polar inertia.
+    Zero where unknown. From rotary inertia, else from E I / E A, else from half the polar inertia.
     """
     s = shapes.sections(x)
     radii = np.sqrt(s.rho_I / s.mass_per_length)
@@ -170,11 +177,11 @@ def gyration_radii(shapes: BeamShapes, x: Array) -> Array:
 
 
 def max_strain(motion: Motion) -> float | None:
-    """Largest strain of a beam: |s'| of its axis, and of the outermost fibre sqrt(3) r |curvature|
-    where the radius of gyration r is known, as of a rectangle.
+    """Largest strain of a beam; None if unknown.
 
-    Of another body the stretch of the lines between its ends, over their lengths.  None where
-    neither is known.
+    |s'| of the axis, and of the outermost fibre sqrt(3) r |curvature| where the radius of gyration
+    r is known, as for a rectangle. For another body, the stretch of the lines between its ends,
+    over their lengths.
     """
     body = motion.body
     if body.shapes is None:
@@ -191,7 +198,7 @@ def max_strain(motion: Motion) -> float | None:
 
 
 def _max_line_stretch(motion: Motion) -> float | None:
-    """Largest change of the distance of two ends along their line at rest, over that distance."""
+    """Largest relative change of the distance of two ends along their undeformed line."""
     stretches = []
     for a, b in combinations(motion.body.ports.values(), 2):
         line = b.position - a.position
@@ -203,13 +210,15 @@ def _max_line_stretch(motion: Motion) -> float | None:
 
 
 def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
-    """(n,) relative error of the frequency of each bending shape of a beam for want of shear (and
-    of rotary inertia where the model has none), 0 of others; None where the section's radius of
-    gyration is not known.
+    """Relative frequency error (n,) of each bending shape function of a beam without shear.
 
-    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the shape in
-    1/m, r the radius of gyration in m; the 1 is rotary inertia.  `line` (m) is the length of the
-    beams that are welded in line with it: as many shapes are judged on all of that.
+    Also without rotary inertia where the model has none; 0 for other shape functions; None where
+    the section's radius of gyration is unknown.
+
+    1/2 (beta r)^2 (E/(k G) + 1) of Timoshenko's correction: beta the wave number of the shape
+    function in 1/m, r the radius of gyration in m; the 1 is rotary inertia. `line` (m) is the
+    length of the beams that are welded in line with it: the same number of shape functions is then
+    assessed on that whole length.
     """
     shapes = body.shapes
     if shapes is None:
@@ -236,8 +245,10 @@ def shear_errors(body: ModalBody, line: float | None = None) -> Array | None:
 
 
 def weighted_shear_error(motion: Motion, line: float | None = None) -> float | None:
-    """The largest of them, each times the share of the body's energy that its shape holds where it
-    holds most: what does not move errs by nothing."""
+    """Largest shear error, each weighted by the largest energy share of its shape function.
+
+    Shape functions that do not move cause no error.
+    """
     errors = shear_errors(motion.body, line)
     if errors is None or not len(motion.t):
         return errors if errors is None else 0.0

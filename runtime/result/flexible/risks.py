@@ -13,8 +13,8 @@ from .range_estimators import BENDING_ENERGY
 if TYPE_CHECKING:
     from .model_range import ModelRange
 
-#: From where on there is one: slope, load ratio of a linear beam and spin in first frequencies,
-#: bending energy that the shapes miss, shear, rotation of a section (rad), buckling, strain.
+#: Thresholds: slope, load ratio of a linear beam and spin in first frequencies, truncated bending
+#: energy, shear, rotation of a section (rad), buckling, strain.
 (
     MAX_SLOPE,
     MAX_LOAD_RATIO,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
-    """Objections to flexible models, one finding per kind, for its worst body."""
+    """Objections to flexible models, one finding per kind, for the worst body."""
     rows = []
     for body_range in found:
         for text in body_range.said:

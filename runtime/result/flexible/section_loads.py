@@ -1,10 +1,10 @@
-"""Loads within a beam from equilibrium: what holds the part beyond a section in its motion.
+"""Section loads of a beam from the equilibrium of the part beyond a section.
 
-The part of the beam between a section and the side that is not held feels its inertia, gravity,
-distributed loads, drag, what hangs on its ends, and the load of the rest of the beam, by which all
-this is balanced (d'Alembert).  Unlike EI v'', which sees only the curvature that the shapes can
-take, this contains what the shapes cannot bend for: concentrated loads, and the axial force of an
-axis that does not stretch.
+On the part of the beam between a section and the free side act its inertia, gravity, distributed
+loads, drag, the loads of its ends, and the load of the rest of the beam, which balances them
+(d'Alembert). Unlike EI v'', which is limited to the curvature of the shape functions, this includes
+loads to which the shape functions cannot deform: concentrated loads, and the axial force of an
+inextensible axis.
 """
 
 from __future__ import annotations
@@ -28,32 +28,36 @@ from .motion import (
     values_at,
 )
 
-#: Gauss points of a panel and fewest panels of a beam: exact for products of cubics at a panel's
-#: size, and fine enough for the shapes that can be told apart.
+#: Gauss points of a panel and least number of panels of a beam: exact for products of cubics at the
+#: panel size, and fine enough for shape functions that are linearly independent.
 _GAUSS_POINTS, _MIN_PANELS = 5, 8
 
-#: Numbers of one batch of samples, about 30 MB an array.
+#: Numbers in one batch of samples, about 30 MB per array.
 _MAX_BATCH_NUMBERS = 2**22
 
 
 @dataclass(frozen=True)
 class PointLoad:
-    """What acts on the beam at x (m): force (n, 3) N and moment (n, 3) N*m about the axis point
-    there, inertial axes."""
+    """Concentrated load on the beam at x (m), inertial axes.
+
+    Force (n, 3) N and moment (n, 3) N*m about the point of the axis there.
+    """
 
     x: float
     force: Array
     moment: Array
 
     def some(self, samples: Any) -> PointLoad:
-        """The same at some samples."""
+        """Load at some of the samples."""
         return PointLoad(self.x, self.force[samples], self.moment[samples])
 
 
 @dataclass(frozen=True)
 class LineLoad:
-    """Force (n, 3) N and moment (n, 3) N*m, spread evenly from x = first to last (m), inertial
-    axes."""
+    """Force (n, 3) N and moment (n, 3) N*m spread evenly from x = first to last (m).
+
+    In inertial axes.
+    """
 
     first: float
     last: float
@@ -61,7 +65,7 @@ class LineLoad:
     moment: Array
 
     def some(self, samples: Any) -> LineLoad:
-        """The same at some samples."""
+        """Load at some of the samples."""
         return LineLoad(self.first, self.last, self.force[samples], self.moment[samples])
 
 
@@ -73,13 +77,13 @@ def section_loads(
     points: Sequence[PointLoad] = (),
     lines: Sequence[LineLoad] = (),
 ) -> tuple[Array, Array]:
-    """Force (n, m, 3) in N and moment (n, m, 3) in N*m of the part beyond x on the part before it.
+    """Section force (n, m, 3) in N and moment (n, m, 3) in N*m from equilibrium.
 
-    In the axes of the section, turned with it: axial force (tension positive) and shear along y
-    and z; torque and bending moments about y and z.  Moments are about the deflected axis.
-    `gravity` in m/s2, inertial axes.  `held` is the x of the section through which the beam hangs
-    on the tree: loads there are not needed, because the free side is added up.  Where a load stands
-    at x itself, the values are those on the held side of it.
+    Loads of the part beyond x on the part before it, in rotated section axes: axial force (tension
+    positive) and shear along y and z; torque and bending moments about y and z. Moments are about
+    the deflected axis. `gravity` in m/s2, inertial axes. `held` is the x of the section by which
+    the beam is attached to the tree: loads there are not needed, because the loads of the free side
+    are summed. At a concentrated load, the values are those on its inboard side.
     """
     edges = _panel_edges(motion, places, points, lines)
     rows = max(1, _MAX_BATCH_NUMBERS // (3 * _GAUSS_POINTS * len(edges)))
@@ -98,7 +102,7 @@ def section_loads(
 def _panel_edges(
     motion: Motion, places: Array, points: Sequence[PointLoad], lines: Sequence[LineLoad]
 ) -> Array:
-    """Ends of the panels: nothing jumps within one."""
+    """Edges of the panels; no load jumps within a panel."""
     shapes = motion.shapes
     count = max(_MIN_PANELS, 2 * motion.eta.shape[1])
     positions = [np.linspace(0.0, shapes.length, count + 1), places, np.asarray(shapes.pieces)]
@@ -137,7 +141,7 @@ class _PanelSums:
         return weighted.reshape(len(density), -1, _GAUSS_POINTS, 3).sum(axis=2)
 
     def _wrench(self, load: PointLoad) -> Array:
-        """(n, 6) of a load, about the frame's origin."""
+        """Force and moment (n, 6) of a load about the frame's origin."""
         force, moment = self.motion.inward(load.force), self.motion.inward(load.moment)
         position = _deflected_positions(self.motion, np.array([load.x]))[:, 0]
         return np.concatenate([force, moment + np.cross(position, force)], axis=1)
@@ -150,7 +154,7 @@ class _PanelSums:
             [np.cumsum(self.panels[:, ::-1], axis=1)[:, ::-1], zero], axis=1
         )
         edge_indices = np.searchsorted(self.edges, places)
-        # At the section itself the part beyond is that on the outer side, which a held tip has not.
+        # At the inboard section the part beyond is that on the outer side, unless it is the tip.
         outer = places >= held if held < self.motion.shapes.length else places > held
         total = np.where(
             outer[:, None], outboard_sums[:, edge_indices], -inboard_sums[:, edge_indices]
@@ -168,16 +172,18 @@ class _PanelSums:
 
 
 def _deflected_positions(motion: Motion, x: Array) -> Array:
-    """(n, m, 3) places of the deflected axis, frame axes."""
+    """Positions (n, m, 3) of the deflected axis, frame axes."""
     at_rest = np.zeros((len(x), 3))
     at_rest[:, 0] = x
     return at_rest + deflection(motion, x)
 
 
 def _second_order_terms(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
-    """Displacement and rotation (n, m, 6) of second order of the sections and their two rates; the
-    rotation is that of the sections' inertia, which of slices that are rigid bodies of their own is
-    all of it."""
+    """Second-order displacement and rotation (n, m, 6) of the sections and their two rates.
+
+    The rotation is that of the sections' inertia; for slices that are separate rigid bodies, the
+    whole rotation.
+    """
     is_for_inertia = not motion.body.points
     pairs = [("eta", "eta"), ("eta", "etad"), ("eta", "etadd"), ("etad", "etad")]
     value, rate, eta_etadd, etad_etad = (
@@ -187,7 +193,7 @@ def _second_order_terms(motion: Motion, x: Array) -> tuple[Array, Array, Array]:
 
 
 def _load_densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Array, Array]:
-    """Places, and force and moment per length of gravity, drag and inertia; frame axes."""
+    """Positions, and force and moment per length of gravity, drag and inertia; frame axes."""
     body, shapes, values = motion.body, motion.shapes, values_at(motion.shapes, x)
     sections = shapes.sections(x)
     second = _second_order_terms(motion, x)
@@ -220,12 +226,12 @@ def _load_densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Ar
 def _rotary_inertia_moment(
     motion: Motion, x: Array, theta: Array, turned: Sequence[Array], per_length: Array
 ) -> Array:
-    """(n, m, 3) rate of the sections' own moment of momentum per length, frame axes.
+    """Rate (n, m, 3) of the sections' own moment of momentum per length, frame axes.
 
-    A point s of a section lies at B s from the axis, B = exp(Psi~) to second order with the part of
-    Psi that turns the sections' inertia (twist alone without rotary inertia), and is accelerated by
-    Q s, Q = (wd~ + w~ w~) B + 2 w~ Bd + Bdd; so int rho (B s) x (Q s) is the axial vector of
-    B (int rho s s^T) Q^T.  Slices that are rigid bodies of their own turn with all of Psi.
+    A point s of a section is at B s from the axis, B = exp(Psi~) to second order with the part of
+    Psi that rotates the sections' inertia (twist alone without rotary inertia), and is accelerated
+    by Q s, Q = (wd~ + w~ w~) B + 2 w~ Bd + Bdd; so int rho (B s) x (Q s) is the axial vector of B
+    (int rho s s^T) Q^T. Slices that are separate rigid bodies rotate with all of Psi.
     """
     if not per_length.any():
         return np.zeros((len(motion.t), len(per_length), 3))
@@ -247,8 +253,11 @@ def _rotary_inertia_moment(
 def _section_rotation(
     motion: Motion, theta: Array, turned: Sequence[Array]
 ) -> tuple[Array, Array, Array]:
-    """B = 1 + Psi~ + Psi~ Psi~ / 2 of the sections' inertia and its two rates, (n, m, 3, 3), from
-    the rotation (m, 3, modes) of first order and that of second order with its rates (n, m, 3)."""
+    """Rotation of the sections' inertia and its two rates, (n, m, 3, 3).
+
+    B = 1 + Psi~ + Psi~ Psi~ / 2, from the first-order rotation (m, 3, modes) and the second-order
+    rotation with its rates (n, m, 3).
+    """
     skew, skew_rate, skew_acceleration = (
         tilde(first_order_field(theta, modal)) for modal in (motion.eta, motion.etad, motion.etadd)
     )

@@ -30,16 +30,16 @@ if TYPE_CHECKING:
     from ..result_record import Record
 
 
-#: Points along a beam in a picture.
+#: Points along a beam in a plot.
 _STATION_COUNT = 61
 
-#: Bodies in one picture; more would hide each other.
+#: Largest number of bodies in one plot; more would hide each other.
 _MAX_BODIES = 60
 
 
 @dataclass(frozen=True)
 class ShapePanel:
-    """A panel: `draw(figure, axes)`, its height in inches, and whether x is the time."""
+    """Panel of shapes: `draw(figure, axes)`, height in inches, and whether x is the time."""
 
     draw: Callable[[Any, Any], None]
     height: float
@@ -47,7 +47,7 @@ class ShapePanel:
 
 
 def panel_names(result: Record) -> Iterator[str]:
-    """Names of all pictures of a result."""
+    """Names of all shape panels of a result."""
     bodies = result.model.flexible
     if bodies:
         yield "shape"
@@ -59,7 +59,7 @@ def panel_names(result: Record) -> Iterator[str]:
 
 
 def shape_panel(result: Record, name: str) -> ShapePanel | None:
-    """The picture of this name, None if there is none."""
+    """Shape panel of this name; None if there is none."""
     if name not in panel_names(result):
         return None
     body, kind = split_reference(name) if "." in name else ("", name)
@@ -71,7 +71,7 @@ def shape_panel(result: Record, name: str) -> ShapePanel | None:
 
 
 def _drawn_samples(result: Record) -> NDArray[np.int64]:
-    """Samples to draw; SceneError if there is none."""
+    """Indices of the samples to draw; SceneError if there are none."""
     valid_samples = np.flatnonzero(np.isfinite(result.q).all(axis=1))
     if not len(valid_samples):
         raise SceneError("there are no shapes to draw: the run has no sample; ask for other times")

@@ -1,8 +1,8 @@
 """Deformation of beams in directions for which they have no shape functions.
 
-A beam is rigid where it has no shapes.  The loads of its sections tell how far it would deform
-there: bend by int |M| / EI dx, twist by int |T| / GI_t dx, and stretch by int |N| / EA dx.  These
-angles do not depend on the floating frame.
+A beam is rigid in directions without shape functions. Its section loads give the deformation that
+it would have there: bending int |M| / EI dx, twist int |T| / GI_t dx, and stretch int |N| / EA dx.
+These angles do not depend on the floating frame.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from mstmm.array_validation import Array
 from ...flexible.beam.static_shapes import direction_stiffness
 from ...flexible.modal_body import ModalBody
 
-#: Deformations that are too small to matter: rad, of axial a strain.
+#: Limits of negligible deformations: rad, for axial a strain.
 _NEGLIGIBLE = {"y": 2e-3, "z": 2e-3, "twist": 2e-3, "axial": 1e-3}
-#: Share of the slope that the shapes take up, below which a deformation does not matter.
+#: Share of the slope of the shape functions below which a deformation is negligible.
 _NEGLIGIBLE_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class UnshapedDeformation:
-    """Deformation (rad, of axial a strain) that loads would cause in a direction without shapes."""
+    """Deformation (rad, axial a strain) that loads would cause in a direction without shapes."""
 
     direction: str
     size: float
 
     @property
     def limit(self) -> float:
-        """Size from which on it matters."""
+        """Smallest significant size."""
         return _NEGLIGIBLE[self.direction]
 
     @property
@@ -50,10 +50,10 @@ class UnshapedDeformation:
 def unshaped_deformation(
     body: ModalBody, x: Array, weights: Array, force: Array, moment: Array, slope: float
 ) -> UnshapedDeformation | None:
-    """Largest deformation that matters, over its limit; None where there is none.
+    """Largest significant deformation, relative to its limit; None if there is none.
 
     `force` and `moment` (n, m, 3) in N and N*m are the section loads at the points x (m,) of a
-    quadrature rule with `weights` (m), and `slope` is the largest slope that the shapes have.
+    quadrature rule with `weights` (m), and `slope` is the largest slope of the shape functions.
     """
     found = (
         UnshapedDeformation(direction, float(np.max(np.abs(load) @ (weights / stiffness))))
@@ -70,7 +70,7 @@ def unshaped_deformation(
 
 
 def unshaped_directions(body: ModalBody) -> list[str]:
-    """Directions of known stiffness for which a beam has no shapes: of y, z, twist, axial."""
+    """Directions of known stiffness without shape functions: of y, z, twist, axial."""
     if body.shapes is None:
         return []
     shaped = {mode.direction for mode in body.shapes.modes}
@@ -84,7 +84,7 @@ def unshaped_directions(body: ModalBody) -> list[str]:
 def _unshaped_loads(
     body: ModalBody, x: Array, force: Array, moment: Array
 ) -> Iterator[tuple[str, Array, Array]]:
-    """Direction, stiffness (m,) and section load (n, m) of each of them."""
+    """Direction, stiffness (m,) and section load (n, m) of each direction without shapes."""
     assert body.shapes is not None
     sections, length = body.shapes.sections(x), body.shapes.length
     loads = {
