@@ -1,1 +1,1 @@
-"""One-way elastodynamics: rigid motion first, then the linear response to it."""
+"""One-way elastodynamics: rigid motion first, then the linear elastic response."""

@@ -1,10 +1,10 @@
-"""Superposition: small elastic motions of bodies on the rigid motion of a tree.
+"""Superposition of small elastic motions of bodies on the rigid motion of a tree.
 
-A small motion moves the point that is at r by a + psi x r (inertial axes) and turns what is there
-by psi.  Hinges pass it on as it is, for their coordinates are those of the rigid run; a flexible
-body adds that of its section on the way out, less that of the section by which it is held, as far
-as the hinge there holds it.  A hinge that is part of a closed loop passes nothing on: it turns by
-what the section turns, and the section does not move otherwise.
+A small motion displaces the point at r by a + psi x r (inertial axes) and rotates its surroundings
+by psi. Hinges transmit it unchanged, because their coordinates are those of the rigid run. A
+flexible body adds the small motion of its outboard section and subtracts that of its inboard
+section, as far as the hinge there constrains it. A hinge that is part of a closed loop transmits
+nothing: it rotates by the rotation of the section, and the section has no other motion.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Jet:
-    """A vector over time, its rate and its second rate, (n, 3) each, inertial axes."""
+    """Vector over time with its first and second rate, (n, 3) each, inertial axes."""
 
     value: Array
     rate: Array
@@ -42,7 +42,7 @@ class Jet:
         return Jet(-self.value, -self.rate, -self.second)
 
     def cross(self, other: Jet) -> Jet:
-        """self x other."""
+        """Cross product self x other."""
         a, b = self, other
         return Jet(
             np.cross(a.value, b.value),
@@ -55,7 +55,7 @@ class Jet:
 
 @dataclass(frozen=True)
 class SmallMotion:
-    """a + psi x r of every point r."""
+    """Small motion of a rigid frame: displacement a + psi x r of every point r."""
 
     origin: Jet
     turn: Jet
@@ -83,14 +83,16 @@ class Superposition:
         self._held: dict[str, SmallMotion] = {}
 
     def moved(self, reference: str) -> Array:
-        """(n, 24): motion of "body" or "body.end" with the elastic motions on its way, as
-        `Observations.points`."""
+        """Motion (n, 24) of "body" or "body.end" including elastic motions inboard of it.
+
+        Columns as in `Observations.points`.
+        """
         points = self.rigid.points(reference)
         small = self.on_way(reference)
         return points if small is None else _add_small_motion(points, small)
 
     def on_way(self, reference: str) -> SmallMotion | None:
-        """The small motion at a reference; None where no one-way body is on its way."""
+        """Small motion at a reference; None if no one-way body is inboard of it."""
         body_index = self.rigid.engine.packed.end(reference)[0]
         body, end = split_reference(reference)
         total: SmallMotion | None = None
@@ -112,7 +114,7 @@ class Superposition:
         return total
 
     def section(self, name: str, end: str) -> SmallMotion:
-        """Small motion of a section of a one-way body against its rigid place."""
+        """Small motion of a section of a one-way body relative to its rigid position."""
         if (name, end) not in self._sections:
             self._sections[name, end] = self._section(name, self.known.one_way[name].ports[end])
         return self._sections[name, end]
@@ -127,7 +129,7 @@ class Superposition:
         return SmallMotion(shift + -rotation.cross(position), rotation)
 
     def held(self, name: str) -> SmallMotion:
-        """The part of the held section's small motion that the hinge there does not allow."""
+        """Part of the inboard section's small motion that the hinge there constrains."""
         if name not in self._held:
             self._held[name] = self._constrained(name)
         return self._held[name]
@@ -152,7 +154,7 @@ def _origin_motion(points: Array) -> Jet:
 
 
 def _to_inertial(points: Array, value: Array, rate: Array, second: Array) -> Jet:
-    """A vector of body components over time, in inertial axes."""
+    """Vector of body components over time, in inertial axes."""
     rotation = points[:, 15:24].reshape(-1, 3, 3)
     spin, spin_rate = points[:, 9:12], points[:, 12:15]
     inertial_value, rate, second = (
@@ -170,7 +172,7 @@ def _to_inertial(points: Array, value: Array, rate: Array, second: Array) -> Jet
 
 
 def _add_small_motion(points: Array, small: SmallMotion) -> Array:
-    """Points (n, 24) with a small motion: places to first order, rotations exp(psi~) R."""
+    """Points (n, 24) with a small motion added: positions to first order, rotations exp(psi~) R."""
     origin = _origin_motion(points)
     origin = origin + small.origin + small.turn.cross(origin)
     spin, spin_rate, small_rotation = points[:, 9:12], points[:, 12:15], small.turn
@@ -189,7 +191,7 @@ def _add_small_motion(points: Array, small: SmallMotion) -> Array:
 
 
 def _exponential(vectors: Array) -> Array:
-    """(n, 3, 3) rotations by rotation vectors (n, 3)."""
+    """Rotations (n, 3, 3) of rotation vectors (n, 3)."""
     angle = np.linalg.norm(vectors, axis=1)
     x, y, z = vectors.T
     zero = np.zeros_like(x)

@@ -1,8 +1,8 @@
-"""Damped oscillators under loads that are piecewise polynomials: their exact motion.
+"""Exact motion of damped oscillators under piecewise polynomial loads.
 
-M etadd + D etad + K eta = p(t).  In the eigenvectors of its first-order form every component is
-yd = lambda y + sum c_j s^j, whose solution over a cell needs no steps: errors come from the
-polynomials alone, whatever the frequencies are.
+M etadd + D etad + K eta = p(t). In the eigenvectors of its first-order form every component obeys
+yd = lambda y + sum c_j s^j, whose solution over a cell is evaluated without steps: the only errors
+are those of the polynomials, whatever the frequencies.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 
-#: Points at which a load is known in each cell: a polynomial of degree 5.
+#: Sampling points of a load in each cell: a polynomial of degree 5.
 POINTS_PER_CELL = 6
-#: Eigenvectors further from being a basis than this belong to critically damped oscillators.
+#: Larger condition numbers of the eigenvectors indicate critically damped oscillators.
 _MAX_CONDITION = 1e7
 
 
@@ -26,7 +26,7 @@ _MAX_CONDITION = 1e7
 class Cells:
     """Intervals of time on each of which loads are one polynomial.
 
-    `edges` (m + 1,) s, increasing; `breaks` are numbers of edges at which loads may jump.
+    `edges` (m + 1,) s, increasing; `breaks` are indices of edges at which loads may jump.
     """
 
     edges: Array
@@ -34,7 +34,7 @@ class Cells:
 
     @classmethod
     def between(cls, times: Array, cells: int) -> Cells:
-        """About `cells` cells between the first and the last of `times`, edges at all of them."""
+        """Cells from the first to the last of `times`, about `cells`, with edges at all times."""
         share = np.diff(times) / (times[-1] - times[0])
         counts = np.maximum(np.ceil(cells * share), 1).astype(int)
         parts = [
@@ -46,30 +46,33 @@ class Cells:
 
     @property
     def lengths(self) -> Array:
-        """(m,) s."""
+        """Cell lengths (m,) in s."""
         return np.diff(self.edges)
 
     @property
     def samples(self) -> Array:
-        """(m * POINTS,) times at which the loads are wanted, inside the cells (Gauss points)."""
+        """Times (m * POINTS_PER_CELL,) of the load samples, inside the cells (Gauss points)."""
         nodes = (np.polynomial.legendre.leggauss(POINTS_PER_CELL)[0] + 1) / 2
         return np.asarray((self.edges[:-1, None] + self.lengths[:, None] * nodes).reshape(-1))
 
     def polynomials(self, values: Array) -> Array:
-        """(m, POINTS, n) coefficients of (s / length)^j from values (m * POINTS, n)."""
+        """Coefficients (m, POINTS_PER_CELL, n) of (s / length)^j from values at `samples`.
+
+        `values` is (m * POINTS_PER_CELL, n).
+        """
         nodes = (np.polynomial.legendre.leggauss(POINTS_PER_CELL)[0] + 1) / 2
         inverse = np.linalg.inv(np.vander(nodes, increasing=True))
         by_cell = values.reshape(len(self.lengths), POINTS_PER_CELL, -1)
         return np.asarray(np.einsum("jp,cpn->cjn", inverse, by_cell))
 
     def jumps(self, coefficients: Array) -> Array:
-        """(n,) largest step of the polynomials at edges where loads are smooth: their error."""
+        """Largest jump (n,) of the polynomials at edges where loads are smooth: their error."""
         before, after = coefficients.sum(axis=1)[:-1], coefficients[1:, 0]
         smooth_edges = [k - 1 for k in range(1, len(self.edges) - 1) if k not in self.breaks]
         return np.asarray(np.max(np.abs(after - before)[smooth_edges], axis=0, initial=0.0))
 
     def find(self, times: Array) -> NDArray[np.int64]:
-        """The cell of each time; an edge belongs to the cell behind it, the last to the last."""
+        """Cell index of each time; an edge belongs to the next cell, the last edge to the last."""
         indices = np.searchsorted(self.edges, times, side="right") - 1
         return np.clip(indices, 0, len(self.lengths) - 1)
 
@@ -84,7 +87,7 @@ class Oscillators:
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
-        """Frequencies (n,) in rad/s and shapes (n, n) with unit modal mass, undamped."""
+        """Frequencies (n,) in rad/s and mode shapes (n, n) with unit modal mass, undamped."""
         from scipy import linalg
 
         squares, shapes = linalg.eigh(self.stiffness, self.mass)
@@ -92,7 +95,10 @@ class Oscillators:
 
     @cached_property
     def _first_order(self) -> tuple[Any, Any, Any]:
-        """lambda (2n,), eigenvectors, and their inverse, over [eta; etad] in undamped modes."""
+        """Eigenvalues lambda (2n,), eigenvectors, and their inverse, over [eta; etad].
+
+        In undamped modes.
+        """
         omega, shapes = self.modes
         n, damping = len(omega), shapes.T @ self.damping @ shapes
         while True:
@@ -105,9 +111,10 @@ class Oscillators:
             damping = damping * (1 + 1e-9) + 1e-12 * np.diag(omega)
 
     def motion(self, cells: Cells, loads: Array, start: tuple[Array, Array], times: Array) -> Array:
-        """(3, times, n): eta, etad, etadd at `times` from `start` = (eta, etad) at the first edge.
+        """Motion (3, times, n): eta, etad, etadd at `times`.
 
-        `loads` (m, POINTS, n) are the polynomials' coefficients.
+        `start` = (eta, etad) at the first edge, and `loads` (m, POINTS_PER_CELL, n) are the
+        coefficients of the polynomials.
         """
         roots, vectors, inverse = self._first_order
         shapes = self.modes[1]
@@ -136,7 +143,10 @@ class Oscillators:
 
 
 def _propagation(roots: Any, lengths: Array, whole: Array) -> tuple[Any, Any]:
-    """e^(lambda s) (m, 2n), and (m, POINTS, 2n): int_0^s e^(lambda (s - r)) (r / whole)^j dr."""
+    """Propagators e^(lambda s) (m, 2n), and integrals of the powers (m, POINTS_PER_CELL, 2n).
+
+    The integrals are int_0^s e^(lambda (s - r)) (r / whole)^j dr.
+    """
     z = lengths[:, None] * roots
     growth = np.exp(z)
     share = (lengths / whole)[:, None]

@@ -1,11 +1,12 @@
-"""One-way linear elastodynamics: the elastic response of bodies to a run in which they are rigid.
+"""One-way linear elastodynamics: elastic response of bodies to a run with rigid bodies.
 
-Jing, Stephansson, section 2.7.1: rigid bodies first, then each body's deformation under the inertia
-and interaction forces found, then superposition.  The second step is the second line of (2.82),
+Jing, Stephansson, section 2.7.1: rigid bodies first, then each body's deformation under the
+resulting inertia and interaction forces, then superposition. The second step is the second line of
+(2.82),
 
     M_ff etadd + D etad + K eta = Q_f - M_fr ydd_r        (and the centrifugal load of the run)
 
-on n oscillators per body, which are solved exactly for loads sampled from the rigid run.
+with n oscillators per body, which are solved exactly for loads sampled from the rigid run.
 """
 
 from __future__ import annotations
@@ -34,17 +35,18 @@ if TYPE_CHECKING:
     from ...run.trajectory import Trajectory
 
 
-#: Steps of the loads' polynomials at smooth edges, of the largest load, that end the refinement.
+#: Largest jump of the load polynomials at smooth edges, relative to the largest load, at which the
+#: refinement ends.
 LOAD_TOLERANCE = 1e-7
 MIN_CELLS, MAX_CELLS = 32, 4096
 
-#: Two edges so near to each other, as part of the run, are one.
+#: Relative distance, as part of the run, below which two edges are merged.
 _MIN_EDGE_DISTANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Response:
-    """Modal coordinates (n, modes) in m or rad, their rates and second rates, over the samples."""
+    """Modal coordinates (n, modes) in m or rad, with first and second rates, at the samples."""
 
     eta: Array
     etad: Array
@@ -53,12 +55,12 @@ class Response:
 
 @dataclass(frozen=True)
 class ResponseCost:
-    """What a one-way run took besides the rigid run itself.
+    """Cost of the elastic response in addition to the rigid run.
 
     evaluations: right-hand sides of the rigid runs from which loads were sampled; samples: states
-    at which loads were computed; cells: intervals on each of which they are one polynomial;
-    oscillators: modal coordinates of all bodies; error: largest step of the loads between cells, of
-    the largest load.
+    at which loads were computed; cells: intervals with one load polynomial each; oscillators: modal
+    coordinates of all bodies; error: largest jump of the loads between cells, relative to the
+    largest load.
     """
 
     evaluations: int
@@ -76,14 +78,14 @@ class ResponseCost:
 
 @dataclass(frozen=True)
 class OneWayResponses:
-    """Responses of the one-way bodies over a run, and what they cost."""
+    """Responses of the one-way bodies over a run, and their cost."""
 
     responses: Mapping[str, Response]
     cost: ResponseCost
 
     @property
     def risks(self) -> tuple[Risk, ...]:
-        """That the loads were too rough for their polynomials."""
+        """Finding that the loads are too rough for their polynomials."""
         if self.cost.error <= 10 * LOAD_TOLERANCE:
             return ()
         return (Risk(
@@ -95,10 +97,11 @@ class OneWayResponses:
 
 
 def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
-    """Responses of every one-way body at the samples of a run of the rigid bodies.
+    """Compute the responses of every one-way body at the samples of a run of the rigid bodies.
 
-    The rigid run is repeated from its start with samples where the loads are wanted, twice as many
-    each time until their polynomials join.  Raises NumericalFailure where it cannot be repeated.
+    The rigid run is repeated from its start with samples at the points where loads are needed,
+    doubling their number until the polynomials join. Raises NumericalFailure where the run cannot
+    be repeated.
     """
     rigid = rigidified_bodies(model)
     total = sum(body.n for body in rigid.one_way.values())
@@ -133,15 +136,14 @@ def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
 
 
 def rigidified_bodies(model: CompiledScene) -> RigidSubstitution:
-    """What became of the bodies that are rigid in a model's runs."""
+    """Substitution of the bodies that are rigid in a model's runs."""
     expanded = model.packed.expanded
     assert expanded is not None and expanded.rigidified is not None
     return expanded.rigidified
 
 
 def _break_times(model: CompiledScene, run: Trajectory) -> Array:
-    """Times of the start and the last sample, and those between at which loads may jump
-    or become narrow."""
+    """Times of the start, the last sample, and possible jumps or narrow features of loads."""
     first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
     time_map = model.packed.time_map(first, last)
@@ -149,7 +151,7 @@ def _break_times(model: CompiledScene, run: Trajectory) -> Array:
     times = np.unique([first, *inner_times, last])
     is_distinct = np.diff(times) > _MIN_EDGE_DISTANCE * (
         last - first
-    )  # a time may lie between two breaks
+    )  # a time may fall between two breaks
     return np.append(times[:-1][is_distinct], last)
 
 
@@ -166,14 +168,14 @@ def _rerun_at_samples(model: CompiledScene, run: Trajectory, grid: Cells) -> Tra
 
 
 def _drop_event_rows(run: Trajectory, grid: Cells) -> Trajectory:
-    """A run's rows at the times asked for alone."""
+    """Rows of a run at the output times only."""
     rows = np.searchsorted(run.t, grid.samples)
     keys = ("t", "q", "u", "memory", "work", "event")
     return replace(run, **{key: getattr(run, key)[rows] for key in keys})
 
 
 def _relative_jump(body: ModalBody, grid: Cells, loads: Array) -> float:
-    """Largest step at smooth edges, of the largest load, both as static deflections."""
+    """Largest jump at smooth edges over the largest load, both as static deflections."""
     largest = np.max(np.abs(loads[:, 0]), axis=0, initial=0.0)
     stiffness = np.diag(body.K)
     scale = float(np.max(largest / stiffness, initial=0.0))
@@ -181,7 +183,7 @@ def _relative_jump(body: ModalBody, grid: Cells, loads: Array) -> float:
 
 
 def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -> Array:
-    """(n, modes) in N: what acts on the shapes of a body that moves rigidly, less its inertia."""
+    """Modal loads (n, modes) in N on a body in rigid motion, minus its inertia."""
     rigid, packed = rigidified_bodies(model), observed.engine.packed
     points = observed.points(body.name)
     rotation = points[:, 15:24].reshape(-1, 3, 3)
@@ -217,7 +219,7 @@ def _require_finite(loads: Array, name: str, observed: Observations) -> Array:
 
 
 def split_node(node: str) -> tuple[str, str]:
-    """("blade", "tip") of "blade/tip"."""
+    """Body and node of a node name: ("blade", "tip") of "blade/tip"."""
     body, _, end = node.partition("/")
     return body, end
 
@@ -230,7 +232,7 @@ def _body_response(
 
 
 def _modal_start(model: CompiledScene, body: ModalBody, load: Array) -> tuple[Array, Array]:
-    """(eta, etad) at the beginning of a run, under modal loads (modes,) in N there."""
+    """Modal coordinates and speeds (eta, etad) at the start, under modal loads (modes,) in N."""
     if _starts_static(model, body.name):
         return np.asarray(np.linalg.solve(body.K, load)), np.zeros(body.n)
     return body.eta, body.etad
@@ -242,7 +244,7 @@ def _starts_static(model: CompiledScene, name: str) -> bool:
 
 
 def _start_responses(model: CompiledScene, run: Trajectory) -> dict[str, Response]:
-    """Responses of a run whose samples, if there are any, all stand at its beginning."""
+    """Responses of a run without samples, or with samples at its start only."""
     responses, observed = {}, Observations(model, run)
     for name, body in rigidified_bodies(model).one_way.items():
         loads = modal_loads(model, body, observed)

@@ -1,4 +1,4 @@
-"""Result of a run with one-way bodies: everything as in `Result`, with the elastic part added."""
+"""Result of a run with one-way bodies: `Result` with the elastic part added."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from ...run.trajectory import Trajectory
 
 
-#: Share of the inertia at a hinge above which a one-way response errs by about 0.3 of itself:
-#: 3 chi / (1 - chi), the factor for recoil and phase.
+#: Share of the inertia at a hinge above which the relative error of a one-way response exceeds
+#: about 0.3: 3 chi / (1 - chi), the factor for recoil and phase.
 MAX_UNCOUPLED_SHARE = 0.09
 
 
@@ -47,7 +47,7 @@ def _coupling_risk(share: tuple[str, float]) -> Risk:
 
 
 def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
-    """Each one-way body whose hinge releases it."""
+    """Findings: each one-way body whose hinge releases it."""
     releasing_hinges, rigid = set(releasable_hinges(model.scene)), rigidified_bodies(model)
     holders = {body: h.name for body, h in rigid.holders.items() if h.name in releasing_hinges}
     return tuple(
@@ -70,11 +70,11 @@ def _impact_risk(name: str) -> Risk:
 
 
 class OneWayResult(Result):
-    """What a run gave whose one-way bodies were rigid in it, and their elastic response.
+    """Result of a run with rigid one-way bodies, including their elastic response.
 
-    q, u, loads of hinges, energies and momenta are those of the rigid run.  Motions of bodies and
-    ends, and deflections and modal energies of one-way bodies, hold the elastic part, computed when
-    the first of them is asked for.
+    q, u, loads of hinges, energies and momenta are those of the rigid run. Motions of bodies and
+    ends, and deflections and modal energies of one-way bodies, include the elastic part, computed
+    on first use.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class OneWayResult(Result):
 
     @cached_property
     def rigid(self) -> Result:
-        """The rigid run alone."""
+        """Result of the rigid run without elastic response."""
         return Result(self.model, self.trajectory, self._error)
 
     @cached_property
@@ -95,7 +95,7 @@ class OneWayResult(Result):
 
     @property
     def cost(self) -> ResponseCost:
-        """What the elastic response took besides the rigid run.  Printable."""
+        """Cost of the elastic response in addition to the rigid run. Printable."""
         return self._one_way.cost
 
     def response(self, body: str) -> Response:
@@ -108,7 +108,7 @@ class OneWayResult(Result):
         return responses[body]
 
     def _outside(self) -> tuple[Risk, ...]:
-        """As of any result, and where the response is not to be trusted."""
+        """Findings of any result, and those about the elastic response."""
         risks = (*super()._outside(), *self._one_way.risks, *_release_risks(self.model))
         if has_impacts(self):
             risks = (*risks, *map(_impact_risk, rigidified_bodies(self.model).one_way))
@@ -116,8 +116,11 @@ class OneWayResult(Result):
 
     @cached_property
     def couplings(self) -> dict[str, float]:
-        """Bodies whose vibration moves the hinge that carries them by more than COUPLED, with the
-        largest share chi of the inertia there that one of their shapes holds."""
+        """Bodies whose vibration moves their hinge significantly, with the largest share chi.
+
+        Bodies with a share of the inertia at the hinge, of one of their shape functions, above
+        `MAX_UNCOUPLED_SHARE`.
+        """
         largest_shares = {
             name: float(np.max(chi)) for name, chi in participation_by_body(self._flexible).items()
         }
@@ -129,7 +132,7 @@ class OneWayResult(Result):
 
 
 class _SuperposedObservations(Observations):
-    """What a run shows, with elastic motions on top of the rigid ones."""
+    """Observations of a run with elastic motions superposed on the rigid ones."""
 
     def __init__(self, result: OneWayResult, rigid: Observations) -> None:
         super().__init__(result.model, result.trajectory)
@@ -141,7 +144,7 @@ class _SuperposedObservations(Observations):
         return Superposition(self._result.model, self._rigid, self._result._one_way.responses)
 
     def points(self, reference: str) -> Array:
-        """(n, 24): motion of "body" or "body.end", see `Observation`."""
+        """Motion (n, 24) of "body" or "body.end", see `Observation`."""
         if reference not in self._moved:
             motion = self._superposition.moved(reference)
             motion.flags.writeable = False
@@ -150,7 +153,7 @@ class _SuperposedObservations(Observations):
 
 
 class _OneWayBodies(FlexibleBodies):
-    """Motions of coupled bodies as they ran, and of one-way bodies as they responded."""
+    """Motions of coupled bodies in the run, and of one-way bodies with their response."""
 
     def __init__(self, result: OneWayResult) -> None:
         super().__init__(result.model, result._observed)
@@ -161,7 +164,7 @@ class _OneWayBodies(FlexibleBodies):
         self.one_way = self._responding
 
     def coupled_start(self) -> tuple[CompiledScene, Array]:
-        """A model in which all of them are coupled, and its q at the start of the run."""
+        """Model in which all flexible bodies are coupled, and its q at the start of the run."""
         model = self.model
         coupled = CompiledScene(with_level(model.scene, "coupled"), model.known)
         q, _ = initial_state(coupled)

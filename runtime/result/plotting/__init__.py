@@ -1,1 +1,1 @@
-"""Pictures of quantities: what is drawn if nobody chose, panels of curves, figures."""
+"""Plots of quantities: default quantities, panels of curves, figures."""

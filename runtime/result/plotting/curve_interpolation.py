@@ -1,4 +1,4 @@
-"""Smooth curves through the samples of a run whose steps were long."""
+"""Smooth curves through the samples of a run with long steps."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..quantity_names import Quantity
 
 
-#: Runs with at least this many samples are drawn as they are; others get this many points.
+#: Runs with at least this many samples are drawn unchanged; others are refined to this many.
 MIN_DRAWN_POINTS = 600
 
 
@@ -37,7 +37,7 @@ def curve(t: Array, quantity: Quantity) -> tuple[Array, Array]:
 
 
 def refine_times(t: Array, density: float) -> Array:
-    """The times themselves and evenly spaced ones between them, `density` per second or more."""
+    """Times with evenly spaced ones added between them, `density` per second or more."""
     parts = [
         np.linspace(a, b, max(2, int((b - a) * density) + 1), endpoint=False)
         for a, b in pairwise(t)

@@ -1,4 +1,4 @@
-"""What to draw of a run if nobody chose: of each kind what moves most, and in words what not."""
+"""Default quantities of a plot: those that move most of each kind, and a note on the others."""
 
 from __future__ import annotations
 
@@ -17,20 +17,24 @@ if TYPE_CHECKING:
     from ...packing.coordinate_layout import HingeSlots
     from ..result_record import Record
 
-#: Curves of a panel, and panels of a picture.
+#: Largest numbers of curves in a panel and of panels in a plot.
 MAX_CURVES, MAX_PANELS = 6, 4
 
-#: A tip that moves by less than this part of the middle is held by the floating frame.
+#: A tip that moves by less than this part of the middle is fixed by the floating frame.
 _ZERO_TIP_RATIO = 1e-9
 
-#: Hinges among which these are looked for; ball and free hinges, whose angles are computed; beams.
+#: Largest numbers of hinges considered, of ball and free hinges whose angles are computed, and of
+#: beams.
 _MAX_HINGES, _MAX_QUATERNION_HINGES, _MAX_BEAMS = 10_000, 60, 60
 
 
 @dataclass(frozen=True)
 class DefaultPanel:
-    """Names of one panel, in the order of the scene; `more` says what is left out, "" if nothing,
-    of which `other` is one."""
+    """Names in one panel, in the order of the scene.
+
+    `more` describes what is left out, "" if nothing, and `other` is the name of one of these
+    quantities.
+    """
 
     names: tuple[str, ...]
     unit: str
@@ -39,7 +43,7 @@ class DefaultPanel:
 
     @property
     def sentence(self) -> str:
-        """What is left out, and how to get it; "" if nothing."""
+        """Note on what is left out, and how to get it; "" if nothing."""
         return f"{self.more}: name what else you want, such as {self.other}" if self.more else ""
 
 
@@ -56,7 +60,7 @@ def rate_candidates(shown: QuantitySource, names: Iterable[str]) -> Iterator[Can
 def choose_panels(
     shown: PlotSource, lines: int = MAX_CURVES, panels: int = MAX_PANELS
 ) -> list[DefaultPanel]:
-    """By unit, in the order of the candidates, those that move most."""
+    """Choose the candidates that move most, grouped by unit in their order."""
     units: dict[str, list[tuple[str, float]]] = {}
     for name, unit, excursion in shown.candidates():
         units.setdefault(unit, []).append((name, excursion))
@@ -74,8 +78,11 @@ def _default_panel(unit: str, some: list[tuple[str, float]], lines: int) -> Defa
 
 
 def default_candidates(result: Record) -> list[Candidate]:
-    """Outputs of the scene; where there are none, coordinates of hinges, Euler angles of those that
-    have quaternions, and deflections of flexible bodies; where nothing moves, the last end."""
+    """Candidates for default quantities of a plot.
+
+    Outputs of the scene; without any, coordinates of hinges, Euler angles of those with
+    quaternions, and deflections of flexible bodies; where nothing moves, the last end.
+    """
     outputs = result._quantities.outputs()
     if outputs:
         quantities = [result.quantity(name) for name in outputs]
@@ -99,7 +106,7 @@ def default_candidates(result: Record) -> list[Candidate]:
 
 
 def _coordinate_candidates(result: Record, hinges: Sequence[HingeSlots]) -> Iterator[Candidate]:
-    """Those that have a unit, which quaternions have not; all at once, as there may be many."""
+    """Candidates among coordinates with a unit, which quaternions lack; all at once for speed."""
     finite_states = result.q[np.isfinite(result.q).all(axis=1)]
     excursions = (
         np.ptp(finite_states, axis=0) if len(finite_states) else np.zeros(result.q.shape[1])
@@ -117,8 +124,10 @@ def _last_end_names(result: Record) -> list[str]:
 
 
 def _deflection_names(result: Record) -> Iterator[str]:
-    """The larger deflection of the tip of each beam, or the first modal coordinate of a body whose
-    frame follows its tip or that is no beam."""
+    """Larger tip deflection of each beam, else the first modal coordinate.
+
+    The modal coordinate is used for a body whose frame follows its tip or that is not a beam.
+    """
     for name, body in islice(result.model.flexible.items(), _MAX_BEAMS):
         if body.shapes is None:
             yield f"{name}.{body.modes[0]}"

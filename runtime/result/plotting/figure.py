@@ -1,4 +1,4 @@
-"""Figures of runs: panels of curves and pictures of flexible bodies (extra: plot)."""
+"""Figures of runs: panels of curves and plots of flexible bodies (extra: plot)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..flexible.shape_panels import panel_names as names_of_pictures
 from .panels import Panel, PlotSelection, Trace, build_panels, constant_axis_limits
 from .plot_sources import PlotSource
 
-#: Colours that stay apart in grey and for colour-blind readers (Okabe and Ito, 2008).
+#: Colours that are distinguishable in grey and for colour-blind readers (Okabe and Ito, 2008).
 _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442")
 
 _STYLE: dict[str, Any] = {
@@ -43,27 +43,27 @@ _STYLE: dict[str, Any] = {
     "savefig.dpi": 150,
 }
 
-#: Inches of a panel of curves, and more of one that has both axes to one scale.
+#: Inches: height of a panel of curves, and extra height of one with equal scales on both axes.
 _PANEL_HEIGHT, _EXTRA_HEIGHT = 2.3, 0.9
 
-#: How curves of equal colour differ, and points; the colour of runs in a legend of both.
+#: Line styles and markers of curves of equal colour; colour of runs in a combined legend.
 _LINE_STYLES = ("-", (0, (5, 1.6)), (0, (1.2, 1.4)), (0, (6, 1.5, 1.2, 1.5)))
 _MARKERS, _RUN_COLOUR = ("o", "s", "^", "D"), "#555555"
 
-#: Amplitudes below this part of the largest are rounding and left out of sight.
+#: Amplitudes below this part of the largest are rounding and not shown.
 _MIN_AMPLITUDE_RATIO = 1e-6
 
 
 @dataclass(frozen=True)
 class PlottedFigure:
-    """A figure with what is in it: names of pictures of flexible bodies, and panels of curves."""
+    """Figure with its contents: names of shape panels, and panels of curves."""
 
     figure: Any
     shapes: tuple[str, ...]
     panels: tuple[Panel, ...]
 
     def write(self, path: Path) -> None:
-        """Into a file; SceneError for another ending than .png, .svg or .pdf."""
+        """Write the figure to a file; SceneError for a suffix other than .png, .svg or .pdf."""
         import matplotlib as mpl
 
         kind = path.suffix.lower().lstrip(".")
@@ -77,7 +77,7 @@ class PlottedFigure:
 def draw_runs(
     runs: Mapping[str, PlotSource], wanted: PlotSelection, title: str | None = None, ax: Any = None
 ) -> PlottedFigure:
-    """Runs by their labels in one figure; see `Result.plot`.
+    """Draw runs by their labels in one figure; see `Result.plot`.
 
     Raises SceneError for an unknown name, EnvironmentFailure without the extra.
     """
@@ -99,7 +99,7 @@ def draw_runs(
 def compose_panels(
     made: Sequence[Panel], title: str | None = None, ax: Any = None
 ) -> PlottedFigure:
-    """Panels of curves in one figure.  EnvironmentFailure without the extra."""
+    """Compose panels of curves in one figure. EnvironmentFailure without the extra."""
     return _compose_figure([], (), made, title, ax)
 
 
@@ -145,7 +145,7 @@ def plot_of(
     beside: Mapping[str, PlotSource] | None = None,
     label: str = "this run",
 ) -> Any:
-    """One run, and others beside it; see `Result.plot`."""
+    """Plot one run together with others; see `Result.plot`."""
     file_path = None if path is None else require_path("picture", path)
     runs: dict[str, PlotSource] = {require_word("label", label, "a text"): run}
     for other_label, other_run in (
@@ -171,7 +171,7 @@ def plot_of(
 def _split_names(
     runs: Mapping[str, PlotSource], wanted: PlotSelection
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of pictures of flexible bodies, and those of quantities."""
+    """Names of shape panels, and names of quantities."""
     record: Any = next(iter(runs.values()))
     names = tuple(dict.fromkeys(wanted.names))
     if len(runs) > 1 or wanted.kind != "time" or wanted.against or not hasattr(record, "model"):
@@ -192,7 +192,7 @@ def _shape_panel(runs: Mapping[str, PlotSource], name: str) -> ShapePanel:
 
 
 def _lay_out(figure: Any, found: Sequence[ShapePanel]) -> None:
-    """Pictures below each other, all panels over time with one time axis below the last."""
+    """Arrange the panels in a column; panels over time share one time axis below the last."""
     groups = [[panel] for panel in found if not panel.over_time]
     groups += [[panel for panel in found if panel.over_time]]
     groups = [group for group in groups if group]
@@ -208,7 +208,7 @@ def _lay_out(figure: Any, found: Sequence[ShapePanel]) -> None:
 
 
 def _draw_into(ax: Any, found: Sequence[ShapePanel]) -> Any:
-    """Draw into axes of somebody else's figure."""
+    """Draw into axes of an existing figure."""
     axes = list(np.ravel(np.asarray(ax, dtype=object)))
     if not all(hasattr(axis, "figure") for axis in axes):
         raise SceneError(f"ax = {abbreviate(ax)}: expected axes of matplotlib, or a list of them")
@@ -225,7 +225,7 @@ def _draw_into(ax: Any, found: Sequence[ShapePanel]) -> Any:
 
 
 def _draw_panel(panel: Panel, figure: Any, axis: Any) -> None:
-    """The curves of one panel, broken where an event makes them jump."""
+    """Draw the curves of one panel, with gaps where an event makes them jump."""
     for trace in panel.traces:
         _draw_curve(axis, trace)
     axis.set_title(panel.title, loc="left", fontsize=10, parse_math=False)
@@ -248,8 +248,10 @@ def _draw_panel(panel: Panel, figure: Any, axis: Any) -> None:
 
 
 def _legend_entries(axis: Any, panel: Panel) -> list[Any]:
-    """Of the legend: every curve, or every column by its colour and then every run by its dashes,
-    and what was left out."""
+    """Legend entries: every curve, or columns by colour and then runs by line style.
+
+    The last entry describes what was left out.
+    """
     from matplotlib.lines import Line2D
 
     handles: list[Any] = axis.get_legend_handles_labels()[0]
@@ -276,7 +278,7 @@ def _draw_curve(axis: Any, trace: Trace) -> None:
 
 
 def _line_style(trace: Trace) -> dict[str, Any]:
-    """Colour and dashes of a curve, or the mark of one that is a point."""
+    """Colour and line style of a curve, or the marker of a single point."""
     style_number = trace.style + trace.colour // len(_COLOURS)
     return {
         "color": _COLOURS[trace.colour % len(_COLOURS)],

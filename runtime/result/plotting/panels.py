@@ -1,4 +1,4 @@
-"""Panels of curves as arrays with labels: what a picture and a page draw alike."""
+"""Panels of curves as arrays with labels, shared by figures and pages."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from .plot_sources import PlotSource
 from .spectra import spectrum
 from .titles import common_noun, with_unit
 
-#: What is drawn: over time or another quantity, the rate over the quantity, or over frequency.
+#: Kinds of plots: over time or another quantity, rate over quantity, or over frequency.
 PLOT_KINDS = ("time", "phase", "spectrum")
 
-#: A panel shows at least this part of its largest value.
+#: A panel spans at least this part of its largest value.
 _MIN_SPAN_RATIO = 1e-3
 
 
 @dataclass(frozen=True)
 class Trace:
-    """A curve through x, y (n,); `colour` and `style` are numbers from 0 on that tell it apart.
+    """Curve through x, y (n,); `colour` and `style` are indices from 0 that distinguish it.
 
-    `low` and `high` (n,) are the edges of a band around it, None where there is none.  Where curves
-    of several runs stand for several columns, `column` and `run` say which.
+    `low` and `high` (n,) are the edges of a band around it, None if there is none. Where curves
+    belong to several runs and several columns, `column` and `run` identify them.
     """
 
     label: str
@@ -47,10 +47,10 @@ class Trace:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves of one unit with a title; `more` says what was left out, `names` what is in it, and
-    `notes` are sentences on what to know.
+    """Curves of one unit with a title.
 
-    `x` says what lies along the other axis, which panels over "time" share.
+    `more` describes what was left out, `names` lists the contents, and `notes` are sentences for
+    readers. `x` describes the other axis, which panels over "time" share.
     """
 
     title: str
@@ -65,7 +65,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class PlotSelection:
-    """What to draw: names, none for a choice; over which other quantity; a kind of KINDS."""
+    """Selection of a plot: names (defaults if empty), `against` quantity, one of `PLOT_KINDS`."""
 
     names: tuple[str, ...] = ()
     against: str | None = None
@@ -88,7 +88,7 @@ class PlotSelection:
 
 
 def build_panels(runs: Mapping[str, PlotSource], wanted: PlotSelection) -> list[Panel]:
-    """One for each unit, in the order of the names; curves of all runs, by their labels.
+    """Build one panel per unit in the order of the names, with the curves of all runs by label.
 
     SceneError for a name that no run has, and for what cannot be drawn of a quantity.
     """
@@ -98,7 +98,7 @@ def build_panels(runs: Mapping[str, PlotSource], wanted: PlotSelection) -> list[
 
 
 def _named_panels(runs: Mapping[str, PlotSource], names: Sequence[str]) -> list[DefaultPanel]:
-    """The names by their units; of several names of one quantity the first."""
+    """Names grouped by unit; of several names of one quantity the first."""
     units: dict[str, dict[str, str]] = {}
     for name in names:
         quantity = _first_quantity(runs, name)
@@ -110,7 +110,7 @@ def _named_panels(runs: Mapping[str, PlotSource], names: Sequence[str]) -> list[
 
 
 def _first_quantity(runs: Mapping[str, PlotSource], name: str) -> Quantity:
-    """Of the first run that has it; what the first one says where none has."""
+    """Quantity of the first run that has it; the error of the first run if none has."""
     first_error: SceneError | None = None
     for run in runs.values():
         try:
@@ -157,8 +157,10 @@ def _build_panel(
 
 
 def constant_axis_limits(panel: Panel) -> tuple[float, float] | None:
-    """Where the axis of a panel of constants ends, which shows them as lines, not their last digits
-    as mountains; None for all others."""
+    """Axis limits of a panel of constants, None for all others.
+
+    Constants are shown as lines, without magnified rounding.
+    """
     values = np.concatenate([trace.y for trace in panel.traces])
     values = values[np.isfinite(values)]
     if not len(values):
@@ -172,7 +174,7 @@ def constant_axis_limits(panel: Panel) -> tuple[float, float] | None:
 
 
 def _first_columns(quantities: Sequence[Quantity]) -> list[int]:
-    """Number of the first column of each."""
+    """Index of the first column of each quantity."""
     counts = [len(column_labels(quantity)) for quantity in quantities]
     return [sum(counts[:k]) for k in range(len(counts))]
 
@@ -180,7 +182,7 @@ def _first_columns(quantities: Sequence[Quantity]) -> list[int]:
 def _panel_titles(
     quantities: Sequence[Quantity], runs: Mapping[str, PlotSource], wanted: PlotSelection
 ) -> tuple[str, str, bool]:
-    """Title, what lies along x, and whether both are lengths."""
+    """Title, label of the x axis, and whether both axes are lengths."""
     text, unit = common_noun(quantities), quantities[0].unit
     if wanted.against is not None:
         abscissa = _require_scalar(_first_quantity(runs, wanted.against))
@@ -196,7 +198,7 @@ def _panel_titles(
 def _drawn_curves(
     run: PlotSource, quantity: Quantity, wanted: PlotSelection
 ) -> Iterator[tuple[Array, Array]]:
-    """x and y of every column."""
+    """Curves (x, y) of every column."""
     if wanted.kind == "spectrum":
         frequencies, amplitudes = spectrum(run.t, quantity)
         yield from ((frequencies, column) for column in amplitudes.T)
@@ -213,7 +215,7 @@ def _drawn_curves(
 
 
 def _rate_quantity(quantity: Quantity) -> Quantity:
-    """Its time derivative; SceneError where that is no quantity."""
+    """Time derivative of a quantity; SceneError if it is not a quantity."""
     rates: Callable[[], Array] | None = quantity.rates
     if rates is None:
         raise SceneError(

@@ -1,4 +1,4 @@
-"""What can be drawn: a result, a file of columns, each run of a batch."""
+"""Sources of plots: a result, a file of columns, each run of a batch."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..quantity_names import Quantity
 
 
 class Candidate(NamedTuple):
-    """What may be drawn, its unit, and the range that it moves through."""
+    """Candidate for a plot: name, unit, and range of its values."""
 
     name: str
     unit: str
@@ -21,7 +21,7 @@ class QuantitySource(Protocol):
     """Quantities by name."""
 
     def quantity(self, name: str) -> Quantity:
-        """SceneError with the nearest name where there is none of this one."""
+        """Quantity of this name; SceneError with the nearest name if there is none."""
         ...
 
 
@@ -32,5 +32,5 @@ class PlotSource(QuantitySource, Protocol):
     def t(self) -> Array: ...
 
     def candidates(self) -> list[Candidate]:
-        """What may be drawn if nobody chose, the most telling kinds first."""
+        """Candidates for default quantities, the most informative kinds first."""
         ...

@@ -1,4 +1,4 @@
-"""Amplitudes over frequency of a run's quantities."""
+"""Amplitude spectra of a run's quantities."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from mstmm.errors import SceneError
 from ..quantity_names import Quantity
 from .curve_interpolation import interpolate
 
-#: Samples that a spectrum needs, and that one is made of at most.
+#: Least number of samples for a spectrum, and largest number used.
 _MIN_SAMPLES, _MAX_SAMPLES = 16, 2**16
 
-#: Frequencies lie this much closer than one over the run, so that a peak is found between them.
+#: Factor of refinement relative to frequencies spaced by one over the run, to locate peaks.
 _FREQUENCY_REFINEMENT = 4
 
 
 def spectrum(t: Array, quantity: Quantity) -> tuple[Array, Array]:
     """Frequencies (m,) in Hz and amplitudes (m, k) in the quantity's unit.
 
-    A sine of amplitude a that lasts for many periods shows as a peak of height a: the mean is taken
-    away, and the rest seen through Hann's window, whose own mean is divided out (SciPy's
-    periodogram, scaling "spectrum").  Samples that are not evenly spaced are read off the curve
-    through them at as many even times; frequencies end where these have two in a period.
+    A sine of amplitude a that lasts for many periods appears as a peak of height a: the mean is
+    subtracted, and Hann's window is applied and normalised by its own mean (SciPy's periodogram,
+    scaling "spectrum"). Samples that are not evenly spaced are interpolated on the curve through
+    them at the same number of even times; frequencies end at two samples per period.
 
     Raises SceneError for too few samples and for values that are not finite.
     """

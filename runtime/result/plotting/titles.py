@@ -1,4 +1,4 @@
-"""Titles of panels: a noun, whose it is, and the unit."""
+"""Titles of panels: noun, owner and unit."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..quantity_names import Quantity
 
-#: Of quantities that have a unit in common and no more.
+#: Nouns of quantities that share only a unit.
 _NOUN_BY_UNIT = {
     "rad": "angles", "m": "lengths", "rad/s": "angular velocities", "m/s": "velocities",
     "rad/s2": "angular accelerations", "m/s2": "accelerations", "N": "forces", "N*m": "moments",
@@ -22,19 +22,21 @@ _UNIT_TEXT = {
     "kg*m2/s": "kg m²/s",
 }
 
-#: Owners that are named one by one.
+#: Largest number of owners that are named individually.
 _MAX_NAMED_OWNERS = 3
 
 
 def with_unit(text: str, unit: str) -> str:
-    """angle of hinge elbow (rad)."""
+    """Text with its unit: angle of hinge elbow (rad)."""
     unit_text = _UNIT_TEXT.get(unit, unit)
     return f"{text} ({unit_text})" if unit_text else text
 
 
 def common_noun(quantities: Sequence[Quantity]) -> str:
-    """What some quantities of one unit are: "angle of hinge elbow", "angle of hinges a, b",
-    "lengths"."""
+    """Common noun of quantities of one unit.
+
+    "angle of hinge elbow", "angle of hinges a, b", "lengths".
+    """
     first = quantities[0]
     if len(quantities) == 1:
         return first.long_name if first.owner or not first.what else first.what
@@ -49,7 +51,7 @@ def common_noun(quantities: Sequence[Quantity]) -> str:
 
 
 def _join_owners(owners: list[str]) -> str:
-    """hinges elbow, wrist; rod1, rod2; 7 hinges."""
+    """Joined owners: hinges elbow, wrist; rod1, rod2; 7 hinges."""
     words = {owner.partition(" ")[0] if " " in owner else "" for owner in owners}
     word = words.pop() if len(words) == 1 else ""
     if len(owners) == 1:
