@@ -1,1 +1,1 @@
-"""What a run gave: quantities, certificate, files, tables and pictures."""
+"""Results of runs: quantities, certificate, files, tables and plots."""

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 BATCH_FORMAT = "mstmm batch"
 #: Quantities that batches do not integrate.
 _ABSENT_QUANTITIES = ("work",)
-#: Runs up to which each is a line; and the edges of the band that stands for more.
+#: Largest number of runs drawn as lines, and percentiles of the band that replaces more.
 _MAX_LINES, _BAND_PERCENTILES = 12, (5.0, 95.0)
 
 
@@ -54,8 +54,8 @@ class BatchRun(Record):
 class BatchResult(AssessedAnswer, BatchData):
     """Results of n runs, with all quantities of single runs except the work.
 
-    Values are nan at times that a run did not reach.  Its runs are not examined, so that a batch is
-    never trusted: simulate single runs for a verdict.
+    Values are nan at times that a run did not reach. The runs are not checked, so a batch is never
+    trusted: simulate single runs for a verdict.
     """
 
     @property
@@ -72,9 +72,9 @@ class BatchResult(AssessedAnswer, BatchData):
         )  # fmt: skip
 
     def run(self, k: int) -> BatchRun:
-        """Run k with its own model, as a result that has names and quantities but no certificate.
+        """Run k with its own model, as a result with names and quantities but no certificate.
 
-        Raises SceneError for a number that is none, and for models with one-way bodies.
+        Raises SceneError for an invalid index, and for models with one-way bodies.
         """
         count = len(self.q)
         expected = f"the number of one of {count} runs, from 0 on"
@@ -113,14 +113,14 @@ class BatchResult(AssessedAnswer, BatchData):
         return tuple(name for name in self.run(0).names() if name not in _ABSENT_QUANTITIES)
 
     def quantity(self, name: str) -> Quantity:
-        """Values (n, m) or (n, m, k) with their unit; SceneError with the nearest name if there is
-        no such quantity."""
+        """Values (n, m) or (n, m, k) with unit; SceneError with the nearest name if unknown."""
         return self._quantities([name])[0]
 
     def to_xarray(self) -> Any:
-        """`xarray.Dataset` as of a single run with the dimension run before the time (extra: io).
+        """`xarray.Dataset` as of a single run, with the dimension run before time (extra: io).
 
-        What does not go by time, such as shapes of beams, is that of the first run.
+        Data that do not depend on time, such as shape functions of beams, are those of the first
+        run.
         """
         try:
             import xarray
@@ -171,8 +171,10 @@ class BatchResult(AssessedAnswer, BatchData):
         ax: Any = None,
         band: bool | None = None,
     ) -> Any:
-        """`matplotlib` figure of quantities over time, as `Result.plot` (extra: plot): a line for
-        each run, or, for more than twelve or as `band` says, the median and a band from 5 to 95 %.
+        """`matplotlib` figure of quantities over time, as `Result.plot` (extra: plot).
+
+        A line for each run, or, for more than twelve or if `band` is true, the median and a band
+        from 5 to 95 %.
         """
         from .plotting.figure import compose_panels, draw_runs
 
@@ -212,7 +214,7 @@ class BatchResult(AssessedAnswer, BatchData):
         return np.isfinite(self.q[k]).all(axis=1) & np.isfinite(self.u[k]).all(axis=1)
 
     def _quantities(self, names: Sequence[str]) -> list[Quantity]:
-        """Of all runs, run by run, so that no more than one is kept beside the values."""
+        """Quantities of all runs, read run by run to limit memory."""
         _reject_absent(names)
         if not len(self.q):
             raise SceneError("a batch of no runs has no quantities")
@@ -254,7 +256,7 @@ def _band_traces(t: Array, quantities: Sequence[Quantity]) -> Iterator[Trace]:
 
 
 def _quantiles(values: Array) -> Array:
-    """(3, m, k) over the runs; nan at times that none has reached."""
+    """Quantiles (3, m, k) over the runs; nan at times that no run has reached."""
     result = np.full((3, *values.shape[1:]), np.nan)
     is_finite = np.isfinite(values).any(axis=(0, 2))
     result[:, is_finite] = np.nanpercentile(

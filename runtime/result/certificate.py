@@ -28,30 +28,31 @@ class Certificate(NotebookDisplay):
     """Quality report of a run.
 
     Attributes:
-        energy: residual of kinetic + potential energy - work (J), against the energy exchanged.
-        momentum: drift of every component of linear and angular momentum that is conserved.
-        quaternion_residual: largest | |quaternion| - 1 | in the samples before they were settled.
-        pivot: the worst loss of digits in the sweep: about 1e-16 times its ratio.
-        singular: the closest approach to coordinates that fail (gimbal).
-        step: the fixed step against the fastest motion at the start; None for adaptive runs.
-        later: the same at the first sample for which it is too long; None where there is none.
-        stability_limited: the method's stability, not its accuracy, set many of the steps; not told
-            of runs that chose their methods themselves.
+        energy: residual of kinetic + potential energy - work (J), relative to the energy exchanged.
+        momentum: drift of every conserved component of linear and angular momentum.
+        quaternion_residual: largest | |quaternion| - 1 | in the samples before normalisation.
+        pivot: largest loss of digits in the sweep: about 1e-16 times its ratio.
+        singular: closest approach to a coordinate singularity (gimbal).
+        step: fixed step compared with the fastest motion at the start; None for adaptive runs.
+        later: the same at the first sample for which the step is too long; None if there is none.
+        stability_limited: whether stability, not accuracy, limited many of the steps; not available
+            for runs that chose their methods themselves.
         sum_of_local_errors: in the mixed units of q and u; NOT the error of the result, which may
             be larger by any factor.
-        error: estimate of the error from a second run; None unless asked for (certify=True).
-        finite: every number of q and u is finite.
-        too_large: the scene has too many bodies for the pivots to be looked at.
-        samples: how many samples there are; balances need two.
+        error: estimate of the error from a second run; None unless requested (certify=True).
+        finite: whether all values of q and u are finite.
+        too_large: whether the scene has too many bodies for a check of the pivots.
+        samples: number of samples; balances need two.
         end: the run's own message.
-        flexible: how far the model of each flexible body was from the end of its range.
-        give: of the stiffest spring, which the estimated error does not count; None without one.
-        failures: why the run, or some of its samples, cannot be used at all.
-        models: where models of the scene are outside their range whatever the run.
-        known: of the scene and its start before the run, and what the run itself has seen.
-        reached: of the error that was asked for (error=...); None where none was.
-        closure: how well loops stayed closed, and what of their loads is open; None for trees.
-        control: of the steps, which says how well balances can be expected to be kept.
+        flexible: validity range of the model of each flexible body.
+        give: deflection of the stiffest spring, which the estimated error does not include; None
+            without a spring.
+        failures: reasons why the run, or some of its samples, cannot be used at all.
+        models: findings about models of the scene outside their range in any run.
+        known: findings about the scene and its start before the run, and those of the run itself.
+        reached: achieved error for a target error (error=...); None without a target.
+        closure: loop closure error, and the number of indeterminate reactions; None for trees.
+        control: step control, which determines the expected drift of the balances.
     """
 
     energy: Drift
@@ -78,9 +79,12 @@ class Certificate(NotebookDisplay):
     closure: Closure | None = None
 
     def verdict(self, accuracy: float = DEFAULT_ACCURACY, balance: float | None = None) -> Verdict:
-        """May the numbers be used?  Within `accuracy` (error in rad; of coordinates that are no
-        angles as a part of how far they went) and `balance` (relative, of energy and momentum; None
-        for what the run's own tolerance or step leaves)."""
+        """Verdict on whether the result can be used.
+
+        Within `accuracy` (error in rad; for coordinates other than angles, relative to their range)
+        and `balance` (relative, of energy and momentum; None for the bound of the run's own
+        tolerance or step).
+        """
         given = None if balance is None else finite_float("balance", balance, "a part")
         return _verdict(
             self, finite_float("accuracy", accuracy, "rad, or a part of the motion"), given
@@ -96,7 +100,7 @@ class Certificate(NotebookDisplay):
         """Findings about the run, objections first; empty for a clean run."""
         pivot, singular = self.pivot, self.singular
         if pivot and singular and singular.risk and pivot.hinge == singular.hinge:
-            pivot = None  # it vanishes where the coordinates fail
+            pivot = None  # the pivot vanishes at a singularity
         is_too_long_at_start = self.step is not None and self.step.risk is not None
         checked = (pivot, singular, self.step if is_too_long_at_start else self.later)
         return order_risks((
@@ -125,7 +129,7 @@ class Certificate(NotebookDisplay):
 
     @property
     def covers(self) -> str:
-        """What the estimated error is the error of, and what it is not."""
+        """Scope of the error estimate, and what it does not include."""
         return _error_scope(self)
 
     def __str__(self) -> str:
@@ -177,8 +181,11 @@ class Certificate(NotebookDisplay):
 
 
 def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
-    """The verdict within bounds: `accuracy` of the error in rad, of coordinates that are no angles
-    as a part of how far they went; `balance` of energy and momentum, relative."""
+    """Verdict within bounds.
+
+    `accuracy` of the error in rad, for coordinates other than angles relative to their range;
+    `balance` of energy and momentum, relative.
+    """
     balance_bound = c.control.bound if balance is None else balance
     objections = list(c.failures) + [
         f"{d.name} changes by {d}, more than the {balance_bound:g} asked for"
@@ -284,7 +291,7 @@ def _format_errors(errors: dict[str, float]) -> str:
 
 
 def _error_scope(c: Certificate) -> str:
-    """What the estimated error is the error of, and what it is not."""
+    """Scope of the error estimate, and what it does not include."""
     parts = ["the integration in time, not how well the scene stands for what is meant"]
     if c.flexible:
         parts.append("not the shapes and frames of flexible bodies, whose rows say how far they go")

@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Drift:
-    """Largest change of a conserved quantity, with the scale that it is compared with."""
+    """Largest change of a conserved quantity, with its reference scale."""
 
     name: str
     unit: str
@@ -19,7 +19,7 @@ class Drift:
 
     @property
     def relative(self) -> float:
-        """largest / scale; 0 where both vanish; nan where the quantity is not finite."""
+        """Relative drift largest / scale; 0 if both vanish; nan if the quantity is not finite."""
         if not self.known:
             return np.nan
         if self.scale > 0:
@@ -28,7 +28,7 @@ class Drift:
 
     @property
     def known(self) -> bool:
-        """False where the quantity overflows or no sample has a value."""
+        """Whether the drift is known: no overflow, and at least one sample has a value."""
         return bool(np.isfinite(self.largest) and np.isfinite(self.scale))
 
     def __str__(self) -> str:

@@ -1,10 +1,10 @@
 """Conditioning of a run: pivots of the sweep and singular angles.
 
-The sweep hands S - S H D^-1 H^T S inwards: the inertia S of what a hinge carries without what the
-hinge gives way to, D = H^T S H + J_rotor.  Where the next pivot D is small beside what was taken
-off (a heavy tip behind light links), digits are lost.  How many follows from the rounding of every
-S, carried inwards as the sweep carries S itself: the accelerations err by about 1e-16 times its
-part in D over D.
+The sweep passes S - S H D^-1 H^T S inwards: the inertia S outboard of the hinge without the part
+along its motion, D = H^T S H + J_rotor. Where the next pivot D is small compared with the
+subtracted part (a heavy tip outboard of light links), digits are lost. The loss follows from the
+rounding of every S, propagated inwards in the same way as S: the relative error of the
+accelerations is about 1e-16 times the propagated rounding in D over D.
 """
 
 from __future__ import annotations
@@ -26,21 +26,22 @@ if TYPE_CHECKING:
     from ..run.trajectory import Trajectory
 
 
-#: Pivot loss and singular measure from which on they are risks.
+#: Pivot loss and singularity measure that are reported as risks.
 MAX_PIVOT_LOSS, MIN_SINGULAR_MEASURE = 1e8, 1e-4
 #: Pivot loss up to which refined accelerations keep their digits.
 MAX_REFINED_LOSS = 1e13
 
-#: Change of angles within a fixed step (rad) that is one where the measure is below the first.
+#: Singularity measure below which a change of angles within a fixed step (rad) is a risk, and the
+#: limit of this change.
 NEAR_SINGULAR_MEASURE, MAX_STEP_ANGLE = 0.1, 0.3
 
 #: Maximum number of samples at which the pivots are checked.
 MAX_PIVOT_SAMPLES = 12
 
-#: Limit of bodies times samples of this check; one sample is always checked.
+#: Limit of bodies times samples of this check; at least one sample is checked.
 _MAX_BODY_SAMPLES = 20_000
 
-#: Scenes with more bodies are not checked: that would take longer than the run.
+#: Larger scenes are not checked: the check would take longer than the run.
 MAX_CHECKED_BODIES = 200_000
 
 _UPPER_TRIANGLE = np.triu_indices(6)
@@ -48,8 +49,10 @@ _UPPER_TRIANGLE = np.triu_indices(6)
 
 @dataclass(frozen=True)
 class PivotLoss:
-    """The worst ratio of rounding (in units of 1e-16) to pivot in a run: which hinge, when (s), and
-    how often accelerations are refined."""
+    """Largest ratio of rounding (in units of 1e-16) to pivot in a run.
+
+    With its hinge, its time (s), and the number of refinements of the accelerations.
+    """
 
     ratio: float
     hinge: str
@@ -58,8 +61,7 @@ class PivotLoss:
 
     @property
     def error(self) -> float:
-        """Of the accelerations, in parts of their size: each refinement leaves of what is wrong the
-        part that was wrong of them."""
+        """Relative error of the accelerations; each refinement multiplies it by the initial one."""
         return min(1e-16 * self.ratio, 1.0) ** (1 + self.refines)
 
     @property
@@ -69,7 +71,7 @@ class PivotLoss:
 
     @property
     def risk(self) -> Risk | None:
-        """Finding that digits are lost; None for a loss up to LOSS."""
+        """Finding that digits are lost; None for a loss up to `MAX_PIVOT_LOSS`."""
         if not self.error > 1e-16 * MAX_PIVOT_LOSS:
             return None
         refined = f", refined {self.refines} times" if self.refines else ""
@@ -84,8 +86,11 @@ class PivotLoss:
 
 @dataclass(frozen=True)
 class SingularDistance:
-    """The smallest measure of a hinge whose coordinates fail where it vanishes (gimbal: |cos|), and
-    how far its speeds turn it within a fixed step (rad), 0 for steps that are chosen."""
+    """Smallest singularity measure of a hinge, and its rotation within a fixed step.
+
+    The coordinates fail where the measure vanishes (gimbal: |cos|). The rotation is in rad, 0 for
+    adaptive steps.
+    """
 
     measure: float
     hinge: str
@@ -94,8 +99,7 @@ class SingularDistance:
 
     @property
     def risk(self) -> Risk | None:
-        """That the coordinates come to where they fail, or that fixed steps are too long for how
-        fast they are near it; None else."""
+        """Finding on a coordinate singularity or on fixed steps too long near one; else None."""
         approach = (
             f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
         )
@@ -123,8 +127,11 @@ class SingularDistance:
 
 
 def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
-    """The worst of some samples spread over the run; None where nothing moves freely, for scenes of
-    more than LARGEST bodies, and by least squares, which make no such difference."""
+    """Largest pivot loss over samples spread over the run.
+
+    None if nothing moves freely, for scenes of more than `MAX_CHECKED_BODIES` bodies, and for least
+    squares, which form no such difference.
+    """
     if (
         not len(run.t)
         or not model.nu
@@ -146,7 +153,7 @@ def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
             continue
         try:
             ratios = pivots.ratios(model.looped.workspace_array(), run.memory[k])
-        except np.linalg.LinAlgError:  # numbers that overflow in products, or underflow
+        except np.linalg.LinAlgError:  # products overflow or underflow
             continue
         hinge_index = int(ratios.argmax())
         if ratios[hinge_index] > worst.ratio:
@@ -156,7 +163,7 @@ def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
 
 
 class _PivotRatios:
-    """Where the engine keeps inertias and motion subspaces of all n bodies."""
+    """Offsets of inertias and motion subspaces of all n bodies in the workspace."""
 
     def __init__(self, model: CompiledScene) -> None:
         packed, lib = model.packed, model.looped.lib
@@ -168,7 +175,7 @@ class _PivotRatios:
         self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
         self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
         column = np.arange(6)
-        self.there = column < speeds  # (n, 6): the columns of H that exist
+        self.there = column < speeds  # (n, 6): existing columns of H
         first = blocks + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_H * speeds
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
         self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
@@ -178,10 +185,10 @@ class _PivotRatios:
         self.modal = ModalPivots(packed, lib)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
-        """(n,) worst ratio of each hinge in the state that left `numbers` in the workspace.
+        """Largest ratio (n,) of each hinge in the state of the workspace `numbers`.
 
-        Every body adds diag |S| to E, the rounding of its S in units of 1e-16, and passes on
-        X^T P^T E P X, P = 1 - H D^-1 H^T S.  The ratio is H^T E H / pivot of D.
+        Every body adds diag |S| to E, the rounding of its S in units of 1e-16, and passes on X^T
+        P^T E P X, P = 1 - H D^-1 H^T S. The ratio is H^T E H / pivot of D.
         """
         S = np.zeros((len(self.parents), 6, 6))
         S[:, _UPPER_TRIANGLE[0], _UPPER_TRIANGLE[1]] = numbers[self.inertia]
@@ -211,12 +218,15 @@ class _PivotRatios:
 
 
 def _pad_to_six(numbers: Sequence[float]) -> list[float]:
-    """Numbers per speed, padded with zeros to six."""
+    """Values per speed, padded with zeros to six."""
     return [*numbers, *[0.0] * (6 - len(numbers))]
 
 
 def _carried_motion(turn: Array, shift: Array) -> Array:
-    """(n, 6, 6): twist of P in its own axes from that of the parent with the hinge locked."""
+    """Transfer matrices (n, 6, 6) of twists from the parent to P, with the hinge locked.
+
+    The twist of P is in its own axes.
+    """
     transposed = turn.transpose(0, 2, 1)
     motion = np.zeros((len(turn), 6, 6))
     motion[:, :3, :3] = motion[:, 3:, 3:] = transposed
@@ -224,11 +234,11 @@ def _carried_motion(turn: Array, shift: Array) -> Array:
     return motion
 
 
-# --- coordinates that fail ------------------------------------------------------------------------
+# --- singular coordinates -------------------------------------------------------------------------
 
 
 def may_be_singular(model: CompiledScene) -> bool:
-    """Whether any hinge has singular coordinates somewhere."""
+    """Whether any hinge has a coordinate singularity."""
     return any(
         _singularity_kernel(model, group.first + k) is not None
         for group in model.layout.groups
@@ -237,7 +247,7 @@ def may_be_singular(model: CompiledScene) -> bool:
 
 
 def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance | None:
-    """The smallest measure over all samples and hinges that have one; None without such hinges.
+    """Smallest measure over all samples and hinges that have one; None without such hinges.
 
     A change of sign between two samples counts as zero: the coordinates failed in between.
     """
@@ -271,7 +281,7 @@ def _smallest_distance(
 
 
 def _singularity_kernel(model: CompiledScene, number: int) -> Any:
-    """The kernel `singularity` of a hinge's type, None if it has none."""
+    """Kernel `singularity` of a hinge's type, None if it has none."""
     packed = model.packed
     if not packed.layout.slots(number).nq:
         return None

@@ -1,7 +1,7 @@
 """Energy and momentum balances of a run.
 
-Energy less work, and momentum without external loads, should stay constant.  Their drift is
-not the error of the motion, but it reveals wrong steps and wrong laws.
+Energy minus work, and momentum without external loads, should stay constant. Their drift is not the
+error of the motion, but it reveals wrong steps and wrong laws.
 """
 
 from __future__ import annotations
@@ -37,8 +37,10 @@ def _max_abs(values: Array) -> float:
 
 
 def _max_change(values: Array) -> float:
-    """Largest change (n,) from the first sample, of those that can be evaluated; nan where one of
-    them is beyond what numbers hold, or none is left."""
+    """Largest change from the first of the values (n,) that can be evaluated.
+
+    nan if one of them overflows, or none is left.
+    """
     valid = values[~np.isnan(values)]
     if not len(valid) or not np.isfinite(valid).all():
         return np.nan
@@ -51,8 +53,8 @@ def _max_change(values: Array) -> float:
 def energy_drift(result: Record) -> Drift:
     """Drift of T + V - W relative to the largest energy exchanged: T, changes of V, W.
 
-    At rest under load nothing is exchanged: then against a part of what is stored, or against what
-    rounding of places is worth to gravity.
+    In static equilibrium no energy is exchanged: the scale is then a fraction of the stored energy,
+    or the energy of gravity due to rounding of positions.
     """
     parts, work = result.energies(), result.work
     with np.errstate(all="ignore"):  # the residual shows an overflow
@@ -79,10 +81,10 @@ def _max_stored_energy(parts: Mapping[str, Array]) -> float:
 def momentum_drifts(result: Record) -> list[Drift]:
     """Drifts of the momentum components that no external load changes.
 
-    Components that are zero throughout, and those that a blow may have changed, are left out.
-    Angular momentum is taken about the origin, or about the one point of the ground through which a
-    scene is held.  Scales: sqrt(2 m T), at rest with a part of what is stored for T, and the larger
-    of the largest angular momentum and that times the scene's reach.
+    Omits components that are zero throughout, and those that an impact may have changed. Angular
+    momentum is about the origin, or about the only point at which the scene is attached to the
+    ground. Scales: sqrt(2 m T), in static equilibrium with a fraction of the stored energy for T,
+    and the larger of the largest angular momentum and that times the extent of the scene.
     """
     scene, drifts = result.model.scene, list[Drift]()
     flexible = result.model.flexible
@@ -173,9 +175,9 @@ def _is_passive(hinge: Hinge) -> bool:
 
 
 def _momentum_pivot(result: Record, reach: float) -> tuple[Array, str]:
-    """The point (3,) about which angular momentum is taken, and how its name says so.
+    """Reference point (3,) of angular momentum, and its description in names.
 
-    The point of the only hinge on the ground, where it stays; else the origin.
+    The point of the only hinge on the ground, if it is fixed; else the origin.
     """
     roots = _ground_hinges(result.model.scene)
     if len(roots) == 1 and not _carries_nothing(roots[0]):
@@ -197,10 +199,10 @@ def _carries_nothing(hinge: Hinge) -> bool:
 def _unsupported_axes(
     result: Record, reach: float, kinetic: float, pivot: Array
 ) -> tuple[list[bool], list[bool]]:
-    """Which components of force, and of moment about the pivot, the ground never passes on.
+    """Components of force, and of moment about the pivot, that the ground never transmits.
 
-    Judged against the largest loads of the scene and against its motion, whose kinetic energy is
-    what moments turn and forces move: where nothing else acts, loads are rounding.
+    Compared with the largest loads of the scene and with its motion, whose kinetic energy limits
+    the loads: where nothing else acts, loads are rounding.
     """
     scene = result.model.scene
     roots = _ground_hinges(scene)

@@ -1,6 +1,6 @@
 """Error measures: distance of two runs over all coordinates, or over named quantities.
 
-A measure reads numbers (n, k) from a result and tells how far two of them are apart, (n,).
+A measure reads values (n, k) from a result and computes the distances (n,) of two of them.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 
 class Measure(ABC):
-    """Error measure: what two runs are compared by.
+    """Error measure for the comparison of two runs.
 
     Attributes:
-        name, unit, scaling: for readers; the unit is "1" where numbers are divided by something.
+        name, unit, scaling: for readers; the unit is "1" for scaled values.
     """
 
     name = ""
@@ -35,11 +35,11 @@ class Measure(ABC):
 
     @abstractmethod
     def read(self, result: Record) -> Array:
-        """Read the compared numbers (n, k) of a run at its samples."""
+        """Read the compared values (n, k) of a run at its samples."""
 
     @abstractmethod
     def apart(self, a: Array, b: Array) -> Array:
-        """Distances (n,) of two runs from their numbers (n, k)."""
+        """Distances (n,) of two runs from their values (n, k)."""
 
     def scale_by(self, numbers: Array) -> None:  # noqa: B027 - most measures need no reference
         """Set the scales from the reference, where they depend on the run."""

@@ -1,9 +1,9 @@
 """Momentum components that the impacts of a run conserve.
 
-A blow between bodies of a scene changes nothing of the momentum of all; one against the world, such
-as a ball's on its floor, does.  Linear momentum along an axis is kept where the scene can be moved
-along it as one rigid body, hinges on the ground allowing, and what the blow strikes does not come
-nearer by that; angular momentum where it can be turned.
+An impact between bodies of a scene does not change the total momentum; an impact against the
+ground, such as that of a ball on the floor, does. Linear momentum along an axis is conserved if the
+scene can translate along it as one rigid body, as its hinges on the ground permit, without changing
+the distance to the struck object; angular momentum if it can rotate about the axis in the same way.
 """
 
 from __future__ import annotations
@@ -22,16 +22,18 @@ from ..engine.state_evaluation.kinematics import Kinematics
 from ..run.scene_system import SceneSystem
 from .result_record import Record
 
-#: Parts of a motion, and of the terms of a rate, that count as zero.
+#: Relative size of motions, and of the terms of a rate, that count as zero.
 _ZERO_RATIO = 1e-9
 
 
 def momentum_kept_by_impacts(
     result: Record, roots: Sequence[Hinge], pivot: Array, asked: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Those components (6,) of what is `asked` that the blows of a run leave as they are: linear
-    momentum along each axis, then angular momentum about `pivot` (3,) in m; `roots` are the hinges
-    on the ground."""
+    """Mask (6,) of the components in `asked` that the impacts of a run conserve.
+
+    Linear momentum along each axis, then angular momentum about `pivot` (3,) in m; `roots` are the
+    hinges on the ground.
+    """
     kept, impacts = asked.copy(), _impact_samples(result)
     if impacts is None:
         return np.zeros_like(asked)
@@ -51,7 +53,7 @@ def has_impacts(result: Record) -> bool:
 
 
 def _impact_samples(result: Record) -> list[tuple[int, int]] | None:
-    """(sample, event) of every impact; None where samples may not show all of them."""
+    """Pairs (sample, event) of all impacts; None if samples may not show all of them."""
     bounce_events = {bounce.event for bounce in result.model.packed.watched.bounces}
     rows = np.flatnonzero(result.event > 0).tolist()
     statistics = result.statistics
@@ -72,8 +74,10 @@ class _RigidScene:
         self._kinematics = Kinematics(result.model.looped, NoFusedCode(), references, lambda: None)
 
     def untouched(self, row: int, event: int, asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Those of the `asked` axes (6,) along and about which the scene can be moved, so that what
-        an event strikes stays as far away."""
+        """Mask of the `asked` axes (6,) along and about which the scene can move rigidly.
+
+        The motion must not change the distance to the object of the event.
+        """
         speeds, allowed = self._rigid(row)
         remaining = asked & allowed
         try:
@@ -85,8 +89,10 @@ class _RigidScene:
         return remaining
 
     def _rigid(self, row: int) -> tuple[Array, NDArray[np.bool_]]:
-        """Speeds (6, nu) of the scene's motions as one body, and which of them (6,) its hinges on
-        the ground allow."""
+        """Speeds (6, nu) of the scene's rigid motions, and mask (6,) of those permitted.
+
+        Permitted are motions that the hinges on the ground allow.
+        """
         speeds, allowed = np.zeros((6, self._result.model.nu)), np.ones(6, dtype=bool)
         jacobians = self._kinematics.jacobian(self._names, np.array(self._result.q[row]))
         for speed_slice, arms, jacobian in zip(self._speeds, self._arms, jacobians, strict=True):
@@ -97,12 +103,12 @@ class _RigidScene:
         return speeds, allowed
 
     def _sizes(self, row: int) -> Array:
-        """Speeds (6,) in m/s of the scene's motions, by the bodies on its hinges on the ground."""
+        """Speeds (6,) in m/s of the scene's rigid motions, at the bodies on ground hinges."""
         max_arm = max((float(np.linalg.norm(arms[row])) for arms in self._arms), default=0.0)
         return np.array([1.0, 1.0, 1.0, max_arm, max_arm, max_arm])
 
     def _stays(self, row: int, event: int, motions: Array, sizes: Array) -> list[bool]:
-        """Whether an event's value does, at one sample, by each of these speeds (n, nu)."""
+        """Whether an event's value is constant at one sample, for each of the speeds (n, nu)."""
         run, system = self._result.trajectory, self._system
         system.memory[:] = run.memory[row]
         t, y = float(run.t[row]), np.concatenate([run.q[row], run.u[row]])
@@ -116,7 +122,9 @@ class _RigidScene:
 
 
 def _twists(arm: Array) -> Array:
-    """(6, 6) velocity and angular velocity, as columns, of a point at `arm` (3,) in m from a pivot
-    where all moves along each axis by 1 m/s, and turns about each by 1 rad/s."""
+    """Velocity and angular velocity (6, 6), as columns, of a point at `arm` (3,) in m.
+
+    From a pivot, for translations along each axis by 1 m/s and rotations about each by 1 rad/s.
+    """
     unit = np.eye(3)
     return np.block([[unit, np.cross(unit, arm).T], [np.zeros((3, 3)), unit]])

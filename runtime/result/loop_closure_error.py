@@ -1,4 +1,4 @@
-"""Loop closure error of a run: gap and slip at its samples."""
+"""Loop closure error of a run: position gap and velocity error at its samples."""
 
 from __future__ import annotations
 
@@ -27,17 +27,20 @@ MISFIT_REMEDY = (
 )
 #: Maximum numbers of checked samples and of named rows.
 _MAX_SAMPLES, _MAX_NAMED_ROWS = 12, 8
-#: Gaps of redundant rows over those of independent rows, from which on the geometry has them.
+#: Ratio of gaps of redundant rows to those of independent rows that indicates a violation by the
+#: geometry.
 _MISFIT_RATIO = 10.0
 
 
 @dataclass(frozen=True)
 class Closure:
-    """Largest gap (m, rad) and slip (m/s, rad/s) of the loops in samples of a run, and in words
-    how many rows count, those that repeat others, and the components of loads that rigid bodies
-    leave open.  Steps `on_positions` leave slips of the size of their errors.  `misfit` is the
-    largest gap (m, rad) of a redundant row if it is no rounding, else 0, and `misfit_loop` names
-    its loop."""
+    """Largest position gap (m, rad) and velocity error (m/s, rad/s) of the loops of a run.
+
+    Over the checked samples. Also describes the number of independent rows, the redundant rows, and
+    the components of indeterminate reactions. Steps `on_positions` leave velocity errors of the
+    size of their errors. `misfit` is the largest gap (m, rad) of a redundant row if it exceeds
+    rounding, else 0, and `misfit_loop` is the name of its loop.
+    """
 
     gap: float
     slip: float

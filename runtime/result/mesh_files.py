@@ -17,8 +17,10 @@ Variable = tuple[tuple[str, ...], Any, dict[str, str], dict[str, Any]]
 
 
 def file_contents(scene: Scene, came: Mapping[str, bytes]) -> dict[str, bytes]:
-    """What the files of a scene's shapes hold, by their paths: as they came with a result, else as
-    they are now.  Files that cannot be read are left out; all are where they are too large to keep.
+    """Contents of the mesh files of a scene's shapes by path.
+
+    As stored with a result, else as they are now. Unreadable files are left out; all of them are if
+    they are too large to store.
     """
     files = dict(came)
     names = {shape.file for shape in scene.shape if shape.file is not None}

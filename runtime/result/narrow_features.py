@@ -1,12 +1,12 @@
 """Detection of narrow features that the steps of a run missed.
 
-A force that is narrow in a coordinate is seen at the stages of steps alone: where these are long
-it is passed over, and every estimated error is zero.  Behind a run its path is known, and so is
-how narrow a function of a coordinate is along it (`breaks.pace`, with the coordinate in the place
-of time): a step that moved on by more than that, across a peak of the function that neither of its
-ends shows, has not seen it.  What reads speeds, several coordinates, or the length of a spring is
-looked at along the run's time instead.  Where samples are output times the steps are not known; if
-one may have passed over something, the run is made once more to see them.
+A force that is narrow in a coordinate is evaluated at the stages of steps only: long steps pass
+over it, and every estimated error is zero. After a run its path is known, and so is the width of a
+function of a coordinate along it (`breaks.pace`, with the coordinate in place of time): a step
+longer than this width, across a peak of the function that neither of its ends shows, has missed it.
+Functions of speeds, several coordinates, or the length of a spring are examined along the run's
+time instead. If samples are output times, the steps are not known; if one may have passed over a
+feature, the run is repeated once to record them.
 """
 
 from __future__ import annotations
@@ -40,35 +40,38 @@ if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
     from ..run.trajectory import Trajectory
 
-#: Part of all it does that a peak must rise by to count.
+#: Least height of a peak, relative to the range of the function.
 _MIN_PEAK_RATIO = 0.1
 
-#: Places of a function that are looked at in a narrow part of it, and its peaks.
+#: Largest numbers of points in a narrow part of a function, and of its peaks.
 _MAX_POINTS, _MAX_PEAKS = 512, 200
 
-#: Steps up to which a run is made again to see all of them.
+#: Largest number of steps for which a run is repeated to record all of them.
 _MAX_RERUN_STEPS = 20_000
 
-#: Expressions by coordinates that are looked at.
+#: Largest number of pairs of expression and coordinate that are examined.
 _MAX_EXPRESSIONS = 100
 
-#: A step that was chosen is longer than what it has passed over along time by this factor at
-#: least: what speeds and several coordinates do together is wider than the bounds of it.
+#: Adaptive steps that missed a feature along time are longer than it by at least this factor: the
+#: bounds on the joint effect of speeds and several coordinates are narrower than the feature.
 _TIME_STEP_FACTOR = 3.0
 
-#: A peak along time counts from this part of all that a function does around the motion.
+#: A peak along time counts from this part of the function's range around the motion.
 _MIN_RANGE_RATIO = 1e-9
 
-#: Steps of a run that are looked at together over time, and cells of them.
+#: Largest numbers of steps examined together over time, and of their cells.
 _STEPS_PER_PIECE, _MAX_CELLS_PER_PIECE = 2**12, 2**15
 
 
 @dataclass(frozen=True)
 class _SampledPath:
-    """A coordinate, or time, along a run: its values (n,) at the start, the samples and the end;
-    between two of them the smallest and the largest, and how far a step went at most, (n - 1,); its
-    unit.  `ranges` are how far functions of time go in the whole run, by their terms: such ones are
-    known between neighbours of `ends` alone."""
+    """Coordinate, or time, along a run.
+
+    Its values (n,) at the start, the samples and the end; between two of them the smallest and the
+    largest, and the largest distance of a step, (n - 1,); its unit. `ranges` are the ranges of
+    functions of time over the whole run, by term: such functions are known between neighbours of
+    `ends` only.
+    """
 
     ends: Array
     least: Array
@@ -90,7 +93,7 @@ def missed_feature_risks(model: CompiledScene, run: Trajectory) -> tuple[Risk, .
 
 
 def _risks_of_steps(model: CompiledScene, run: Trajectory) -> tuple[Risk, ...]:
-    """The same of steps that are known; between output times of the longest that there was."""
+    """Findings for known steps; between output times, for the longest step of the run."""
     risks = dict[str, Risk]()
     candidates = chain(_coordinate_candidates(model, run), _time_candidates(model, run))
     for subject, view, path in islice(candidates, _MAX_EXPRESSIONS):
@@ -101,13 +104,15 @@ def _risks_of_steps(model: CompiledScene, run: Trajectory) -> tuple[Risk, ...]:
 
 
 def _has_step_samples(run: Trajectory) -> bool:
-    """Whether samples are where steps ended that were chosen, short where something is seen."""
+    """Whether samples are the ends of adaptive steps, which shorten at detected features."""
     return run.settings.output_times is None and run.settings.step is None
 
 
 def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory | None:
-    """The run once more, as far as it came, with all its steps as samples; None if that takes long,
-    or does not lead there again."""
+    """Repeat the run with all its steps as samples, as far as it came.
+
+    None if that takes too long, or does not reach the same end.
+    """
     if run.statistics.steps > _MAX_RERUN_STEPS:
         return None
     _, q, u = run.first
@@ -139,8 +144,10 @@ def _risk(
 def _coordinate_candidates(
     model: CompiledScene, run: Trajectory
 ) -> Iterator[tuple[str, ExpressionFunctions, _SampledPath]]:
-    """Whatever acts and reads coordinates: what it is, as a function of one of them, and the path
-    of that."""
+    """Active expressions of coordinates, as functions of one of them, with its path.
+
+    Each with its description.
+    """
     fractions = _step_fractions(run)
     if fractions is None:
         return
@@ -162,8 +169,10 @@ def _coordinate_candidates(
 def _time_candidates(
     model: CompiledScene, run: Trajectory
 ) -> Iterator[tuple[str, ExpressionFunctions, _SampledPath]]:
-    """Whatever acts and reads speeds, several names or a length, as a function of time; a long run
-    in pieces."""
+    """Active expressions of speeds, several names or a length, as functions of time.
+
+    Long runs are divided into pieces.
+    """
     states = _distinct_states(run)
     if states is None:
         return
@@ -191,7 +200,7 @@ def _time_candidates(
 
 
 def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
-    """What may have peaks; an angle only jumps, where it passes half a turn."""
+    """Terms that may have peaks; an angle only jumps, at half a turn."""
     terms = view.expression.terms
     return [watched for watched in view.watched() if terms[watched.term].op != "atan2"]
 
@@ -199,8 +208,10 @@ def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
 def _function_ranges(
     view: ExpressionFunctions, t: Array, known: Mapping[str, SampledVariable]
 ) -> dict[int, float]:
-    """How far functions of an expression go, by their terms: at the times t (n,), and a small part
-    of that around the motion."""
+    """Ranges of functions of an expression by term, at the times t (n,).
+
+    Including a small part of the range around the motion.
+    """
     result = dict[int, float]()
     enclosures = _enclosures_around(view.expression, view.constants, known)
     for term in {view.expression.root, *(watched.term for watched in _peaked_terms(view))}:
@@ -224,8 +235,10 @@ def _enclosures_around(
 def _multi_variable_loads(
     model: CompiledScene,
 ) -> Iterator[tuple[ActiveExpression, Hinge | None, dict[str, float], list[str]]]:
-    """Whatever acts, may have peaks, and reads more than a coordinate: with its hinge, constants
-    and names."""
+    """Active expressions of more than one coordinate that may have peaks.
+
+    Each with its hinge, constants and names.
+    """
     for load in active_expressions(model.scene):
         if load.condition or load.drive or load.expression.depends_on_time_only:
             continue
@@ -241,8 +254,7 @@ def _multi_variable_loads(
 
 
 def _may_hide_features(model: CompiledScene, run: Trajectory) -> bool:
-    """Whether what reads speeds or several names may be so narrow, for all that its samples tell,
-    that steps between them have passed over it."""
+    """Whether functions of speeds or several names may be narrow enough to hide between samples."""
     states, max_step = _distinct_states(run), _max_step(run)
     if states is None or np.diff(states.t).max() <= 2 * max_step:
         return False
@@ -260,7 +272,7 @@ def _may_hide_features(model: CompiledScene, run: Trajectory) -> bool:
 
 
 def _padded_enclosure(course: SampledVariable) -> Enclosure:
-    """All values and rates that a number has along a run, with half as much room around."""
+    """Bounds of all values and rates of a variable along a run, widened by half."""
     bounds = []
     for x in (course.values, course.rates):
         margin = 0.25 * np.ptp(x)
@@ -269,7 +281,7 @@ def _padded_enclosure(course: SampledVariable) -> Enclosure:
 
 
 def _distinct_states(run: Trajectory) -> RunStates | None:
-    """States of a run at times that differ, the last of each; None where there is no way."""
+    """States of a run at distinct times, the last of each; None for fewer than two."""
     t, q, u = _all_states(run)
     memory = run.memory
     if run.start is not None and run.last is not None and len(memory):
@@ -281,7 +293,7 @@ def _distinct_states(run: Trajectory) -> RunStates | None:
 
 
 def _max_step(run: Trajectory) -> float:
-    """No step between two samples is longer than this, s."""
+    """Upper bound of the steps between two samples, s."""
     settings = run.settings
     if settings.output_times is None:
         return np.inf
@@ -290,7 +302,7 @@ def _max_step(run: Trajectory) -> float:
 
 
 def _all_states(run: Trajectory) -> tuple[Array, Array, Array]:
-    """(t, q, u) at the start, the samples and the end."""
+    """Times, coordinates and speeds (t, q, u) at the start, the samples and the end."""
     t, q, u = run.t, run.q, run.u
     if run.start is not None and run.last is not None:
         (end, *last), first = run.last, (run.settings.t_start, *run.start)
@@ -301,8 +313,7 @@ def _all_states(run: Trajectory) -> tuple[Array, Array, Array]:
 
 
 def _step_fractions(run: Trajectory) -> Array | None:
-    """Part of the way between two of these states that one step went, at most; None where there is
-    no way."""
+    """Largest part of the interval between two states that one step covers; None without any."""
     settings, (t, q, _) = run.settings, _all_states(run)
     if len(t) < 2 or not np.isfinite(q).all():
         return None
@@ -316,7 +327,7 @@ def _step_fractions(run: Trajectory) -> Array | None:
 def _coordinate_path(
     model: CompiledScene, run: Trajectory, parts: Array, name: Name, own: Hinge | None
 ) -> _SampledPath | None:
-    """Of a coordinate; None for other names."""
+    """Path of a coordinate; None for other names."""
     hinge = name.hinge or ("" if own is None else own.name)
     if name.quantity != "q" or not hinge:
         return None
@@ -333,8 +344,10 @@ def _coordinate_path(
 
 
 def _cubic_values(h: Array, ends: Array, rates: Array) -> Array:
-    """(7, n - 1) values between ends (n,) that are h (n - 1,) apart, those among them; of cubics
-    with these rates."""
+    """Values (7, n - 1) of cubics with these rates between `ends` (n,), ends included.
+
+    The ends are `h` (n - 1,) apart.
+    """
     x = np.linspace(0.0, 1.0, 7)[:, None]
     a, b, va, vb = ends[:-1], ends[1:], h * rates[:-1], h * rates[1:]
     return np.asarray(a + x * (b - a) + x * (1 - x) * ((1 - x) * (va - b + a) + x * (b - a - vb)))
@@ -346,7 +359,7 @@ def _cubic_values(h: Array, ends: Array, rates: Array) -> Array:
 def _first_missed_peak(
     view: ExpressionFunctions, path: _SampledPath, ends_are_steps: bool
 ) -> tuple[float, float, float] | None:
-    """(where, how far steps went there, how far they should) of the first peak passed over."""
+    """First missed peak: (position, length of steps there, required length)."""
     low, high = float(path.least.min()), float(path.most.max())
     watched = _peaked_terms(view) if path.ranges else view.watched()
     if not high > low or not watched:
@@ -373,7 +386,7 @@ def _first_missed_peak(
                 missed &= (
                     _hidden_height(value, ends, ends_are_steps) > _MIN_PEAK_RATIO * function_range
                 )
-            if path.ranges and missed.any():  # a part that is narrow may do nothing to the whole
+            if path.ranges and missed.any():  # a narrow part may not affect the whole
                 whole_values = view.values(root, np.append(path.ends, position))
                 missed &= (
                     _hidden_height(whole_values[-1], whole_values[:-1], ends_are_steps)
@@ -385,7 +398,7 @@ def _first_missed_peak(
 
 
 def _hidden_height(value: float, ends: Array, both: bool) -> Array:
-    """(n - 1,) how far a value is from those at the ends (n,) of steps: from both, or from one."""
+    """Height (n - 1,) of a value over those at the ends (n,) of steps: over both, or over one."""
     distances = np.abs(value - ends)
     return np.asarray((np.minimum if both else np.maximum)(distances[1:], distances[:-1]))
 
@@ -393,7 +406,7 @@ def _hidden_height(value: float, ends: Array, both: bool) -> Array:
 def _narrow_peaks(
     view: ExpressionFunctions, one: WatchedFunction, known: StepLimits, narrow: Array, high: float
 ) -> tuple[Array, Array, Array]:
-    """Peaks of a function in its narrow parts: where, how high, and how far a step may go there."""
+    """Peaks of a function in its narrow parts: position, height, and step limit there."""
     ends = np.append(known.starts[1:], high)
     positions, limits = [np.zeros(0)], [np.zeros(0)]
     parts = (known.starts, ends, known.longest)
@@ -403,10 +416,10 @@ def _narrow_peaks(
         limits.append(np.full(count, limit_of_part))
     points, first_indices = np.unique(
         np.concatenate(positions), return_index=True
-    )  # where parts meet
+    )  # shared edges of parts
     limit = np.concatenate(limits)[first_indices]
     values = view.values(one.term, points)
     signs = np.sign(np.diff(values))
-    moving = np.flatnonzero(np.abs(signs) > 0)  # between places of equal height it has turned, too
+    moving = np.flatnonzero(np.abs(signs) > 0)  # equal neighbours may be a turning point, too
     peak_indices = moving[1:][np.diff(signs[moving]) != 0][:_MAX_PEAKS]
     return points[peak_indices], values[peak_indices], limit[peak_indices]

@@ -1,7 +1,7 @@
 """Observations of the states of a run, computed in batches on first use and cached.
 
-One batch of the engine gives everything at once for a run of usual size; where that would not fit
-into memory, each body and each kind of quantity is a batch of its own.
+For a run of usual size one batch of the engine evaluates everything; where that exceeds the memory,
+each body and each kind of quantity is a separate batch.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ if TYPE_CHECKING:
 #: Numbers of one batch, about 130 MB.
 _MAX_BATCH_NUMBERS = 2**24
 
-#: Bodies and ends of a scene up to which all of them are observed together.
+#: Largest number of bodies and ends of a scene that are observed together.
 _MAX_JOINT_REFERENCES = 1000
 
 
 class Observations:
-    """Arrays over the samples of a trajectory.  Rows that cannot be evaluated are nan.
+    """Observed arrays over the samples of a trajectory. Rows that cannot be evaluated are nan.
 
-    `failures` holds one sentence for each such row, as far as they have been met.
+    `failures` holds one sentence for each such row found so far.
     """
 
     def __init__(self, model: CompiledScene, run: Trajectory) -> None:
@@ -45,7 +45,7 @@ class Observations:
         self._parts: dict[str, Array] = {}
 
     def points(self, reference: str) -> Array:
-        """(n, 24): motion of "body" or "body.end", see `Observation`."""
+        """Motion (n, 24) of "body" or "body.end", see `Observation`."""
         require_word("body", reference, "the name of a body or an end, such as 'rod1.tip'")
         if reference not in self._points:
             canonical_name = self.references.place(reference)
@@ -54,8 +54,10 @@ class Observations:
         return self._points[reference]
 
     def node(self, name: str) -> Array:
-        """(n, 24): as `points` of a body of the engine's own scene, such as a point mass of a beam
-        "blade/point 1", or of any body of the user's."""
+        """Motion (n, 24) of a body of the engine's scene or of the user's, as `points`.
+
+        Bodies of the engine's scene are, for example, point masses of a beam, "blade/point 1".
+        """
         if name not in self._points:
             self._seen([name], ("points",))
         return self._points[name]
@@ -68,26 +70,26 @@ class Observations:
                 self._seen(missing, ("points",))
 
     def part(self, name: str) -> Array:
-        """loads, efforts, udot, sums or rows, see `Observation`."""
+        """Array of loads, efforts, udot, sums or rows, see `Observation`."""
         if name not in self._parts:
             self._observe(name, None)
         return self._parts[name]
 
     def columns(self, name: str, which: Any) -> Array:
-        """Some columns `which` of loads, efforts or udot; of large ones no more is kept."""
+        """Columns `which` of loads, efforts or udot; of large arrays only these are kept."""
         return np.concatenate([part[(slice(None), *which)] for part in self._pieces(name)])
 
     def loads(self, hinge: str, first: int) -> Array:
-        """(n, 3) force (first 0) or moment (3) of a hinge."""
+        """Force (n, 3) (first 0) or moment (3) of a hinge."""
         observations, hinge_index = self, self.engine.packed.hinge_position.get(hinge)
-        if hinge_index is None:  # of a hinge that welds bodies packed as one
+        if hinge_index is None:  # the hinge welds bodies packed as one
             observations = self.apart
             hinge_index = observations.engine.packed.hinge_position[hinge]
         return observations.columns("loads", (hinge_index, slice(first, first + 3)))
 
     @cached_property
     def apart(self) -> Observations:
-        """The same by the engine in which every body is by itself."""
+        """Observations by the engine that packs every body separately."""
         result = Observations(self._model, self.run)
         result.engine = self._model.apart
         return result
@@ -103,7 +105,7 @@ class Observations:
         return largest[0], largest[1]
 
     def _pieces(self, name: str) -> Iterator[Array]:
-        """A part, piece by piece in time where all of it would not fit into memory."""
+        """A part in pieces over time where all of it would exceed the memory."""
         width = {"loads": 6 * self.engine.packed.topology.count}.get(name, self.engine.nu)
         run, rows = self.run, max(1, _MAX_BATCH_NUMBERS // max(1, width))
         if name in self._parts or len(run.t) <= rows:
@@ -155,9 +157,9 @@ def _clear_modal_efforts(efforts: Array, layout: Layout) -> None:
 def quaternions(matrices: Array) -> Array:
     """Unit quaternions (n, 4), w, x, y, z, of rotation matrices (n, 9), row by row.
 
-    The largest of the four components is found first, so that no division is by a small number
-    (Shepperd, J. Guidance and Control 1 (1978) 223-224).  The sign is continuous over the rows and
-    w >= 0 in the first one.
+    The largest of the four components is computed first, so that no division is by a small number
+    (Shepperd, J. Guidance and Control 1 (1978) 223-224). The sign is continuous over the rows and w
+    >= 0 in the first one.
     """
     r = matrices.reshape(-1, 3, 3)
     x, y, z = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
@@ -176,7 +178,7 @@ def quaternions(matrices: Array) -> Array:
 
 
 def continuous_signs(q: Array) -> Array:
-    """Signs (n,) that make neighbouring quaternions point the same way; +w first."""
+    """Signs (n,) that make neighbouring quaternions continuous; w >= 0 in the first one."""
     if not len(q):
         return np.ones(0)
     steps = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0, -1.0, 1.0)

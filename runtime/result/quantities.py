@@ -53,8 +53,8 @@ RATE_KINDS = {
 class Quantities:
     """Quantities of a run by name, from its states and observations.
 
-    Names are made per owner, a hinge, a body, an end, a spring, a load, a bushing, a constraint, a
-    coupling or the scene (""), when they are asked for.
+    Names are created on demand per owner: a hinge, a body, an end, a spring, a load, a bushing, a
+    constraint, a coupling or the scene ("").
     """
 
     def __init__(self, observed: Observations, flexible: FlexibleResults) -> None:
@@ -64,7 +64,7 @@ class Quantities:
         self._named = observed.references.scene.names
         self._orientations: dict[str, Array] = {}
         self._tables: dict[str, Table] = {}
-        #: What adds the quantities of whatever else acts or closes loops, by its name.
+        #: Functions that add the quantities of other elements and of loops, by name.
         self._more: dict[str, list[Callable[[Table], None]]] = {}
         scene, loop_scene = observed.references.scene, observed.engine.packed.described
         for spring in scene.spring:
@@ -78,10 +78,10 @@ class Quantities:
         for coupling in loop_scene.coupling:
             self._owned(coupling.name, partial(add_coupling, observed=observed, name=coupling.name))
 
-    # --- of bodies ------------------------------------------------------------------------------
+    # --- bodies ---------------------------------------------------------------------------------
 
     def of_body(self, reference: str, kind: str) -> Array:
-        """(n, 3), or (n, 4) for the orientation."""
+        """Quantity (n, 3) of a body or end, or (n, 4) for the orientation."""
         points = self.observed.points(reference)
         if kind != "orientation":
             return points[:, POINT_COLUMNS[kind]]
@@ -89,10 +89,10 @@ class Quantities:
             self._orientations[reference] = quaternions(points[:, 15:24])
         return self._orientations[reference]
 
-    # --- of hinges ------------------------------------------------------------------------------
+    # --- hinges ---------------------------------------------------------------------------------
 
     def slots(self, hinge: str) -> HingeSlots:
-        """Place of a hinge in q and u; SceneError with the nearest name if there is none."""
+        """Slots of a hinge in q and u; SceneError with the nearest name if there is none."""
         require_word("hinge", hinge, "the name of a hinge")
         hinge_slots = self.layout.hinges.get(hinge)
         if hinge_slots is None:
@@ -104,7 +104,7 @@ class Quantities:
         return hinge_slots
 
     def of_hinge(self, hinge: str, kind: str) -> Array:
-        """force or moment (n, 3)."""
+        """Force or moment (n, 3) of a hinge."""
         if require_word("hinge", hinge, "the name of a hinge") in self.layout.modal:
             raise SceneError(
                 f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
@@ -118,7 +118,7 @@ class Quantities:
         return self.observed.columns("efforts", (self.slots(hinge).u_slice,))
 
     def sum(self, name: str) -> Array:
-        """One of SUMS: (n,) or (n, 3)."""
+        """Sum over the scene, by name: (n,) or (n, 3)."""
         columns = SUMS[name][2]
         values = self.observed.part("sums")[:, columns]
         if name == "energy":
@@ -128,7 +128,7 @@ class Quantities:
     # --- by name --------------------------------------------------------------------------------
 
     def get(self, name: str) -> Quantity:
-        """The quantity of this name; SceneError with the nearest name if there is none."""
+        """Quantity of this name; SceneError with the nearest name if there is none."""
         if not isinstance(name, str):
             raise SceneError(f"quantity {name!r}: expected a name, such as energy")
         for full_name in self._named.meant(name):
@@ -153,8 +153,10 @@ class Quantities:
         return [owner for owner in owners if self._owns(owner)]
 
     def acting_wholes(self) -> Iterator[Quantity]:
-        """What springs, loads, bushings and what closes loops do, vectors undivided; of a name that
-        is also that of a hinge or body, what those do stands elsewhere."""
+        """Vector quantities of springs, loads, bushings and loop constraints, undivided.
+
+        For a name shared with a hinge or body, those of the hinge or body are elsewhere.
+        """
         for owner in self._more:
             table = Table({}, [])
             for add in self._more[owner]:
@@ -169,11 +171,11 @@ class Quantities:
         return (name for owner in self.owners() for name in self.of(owner).entries)
 
     def scalars(self) -> list[str]:
-        """One name for every number there is per sample, in the order of a wide table."""
+        """Names of all scalar columns per sample, in the order of a wide table."""
         return [name for owner in self.owners() for name in self.of(owner).scalars]
 
     def outputs(self) -> list[str]:
-        """The outputs of the scene that this model has."""
+        """Outputs of the scene that are available in this model."""
         scene_entries = self.of("").entries
         return [
             output.name
@@ -263,8 +265,10 @@ class Quantities:
             self._output(table, output)
 
     def _output(self, table: Table, output: Output) -> None:
-        """Under its name; of a vector its components too.  Models of a lower level, which lack a
-        quantity of it, do not have it."""
+        """Add an output under its name, and the components of a vector.
+
+        Models of a lower level, which lack a quantity of the output, do not have it.
+        """
 
         def is_there(name: str) -> bool:
             owners = (table, *map(self.of, self._owners_in(name)))

@@ -16,9 +16,8 @@ Values = Callable[[], Array]
 class Quantity:
     """Values (n,) or (n, k) over time; `labels` has one entry per column.
 
-    `rates` are their time derivatives where these are quantities themselves.  `what` of an `owner`
-    it is: "angle" of "hinge elbow"; "" where there is no owner.  `note` is a sentence on what to
-    know when they are read.
+    `rates` are their time derivatives if these are also quantities. `what` is the noun of an
+    `owner`: "angle" of "hinge elbow"; "" without an owner. `note` is a sentence for readers.
     """
 
     name: str
@@ -39,8 +38,10 @@ def column_labels(quantity: Quantity) -> list[str]:
 
 @dataclass
 class Table:
-    """Names of one owner: how to get each quantity, one name for every number, and the `whole`
-    quantities, vectors undivided, that files hold.  Of equal names the first one counts."""
+    """Names of one owner: getters, names of all scalar columns, and undivided vectors.
+
+    Files hold the `whole` quantities, with vectors undivided. Of equal names the first one counts.
+    """
 
     entries: dict[str, Callable[[], Quantity]]
     scalars: list[str]
@@ -60,11 +61,11 @@ class Table:
         self, name: str, owner: str, about: QuantityKind, get: Values, rates: Values | None = None,
         listed: bool = True, note: Callable[[Array], str] | None = None, base: str = "",
     ) -> None:  # fmt: skip
-        """The vector under its name, each component under name.x, and short as in rod1.tip.vx, of
-        `base` where the owner has another name than "hinge shoulder".
+        """Add a vector under its name, each component under name.x, and a short name (rod1.tip.vx).
 
-        What is not `listed` has names but no column in a wide table.  `note` gives a sentence on
-        the values.
+        `base` is the prefix of names if the owner has another name than "hinge shoulder". If not
+        `listed`, it has names but no column in a wide table. `note` returns a sentence on the
+        values.
         """
         what, long_name = about.long_name, f"{about.long_name} of {owner}"
 

@@ -23,29 +23,29 @@ class Result(Record, NotebookDisplay):
     """Result of a run: states and derived quantities at the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
-    Quantities beyond q and u are computed in one batch when the first of them is asked for, and
-    kept (their arrays are read-only).  Where a sample cannot be evaluated they are nan and
-    `warnings` says so.
+    Quantities other than q and u are computed in one batch on first use and cached (their arrays
+    are read-only). Samples that cannot be evaluated are nan and listed in `warnings`.
 
     Attributes:
-        model: the model that ran.
-        t: (n,) s.  Equal neighbours stand just before and just after an event.
+        model: the model of the run.
+        t: (n,) s. Equal neighbours are the states just before and just after an event.
         q: (n, nq) hinge coordinates, hinges in the scene's order; m, rad, unit quaternions.
         u: (n, nu) hinge speeds; m/s, rad/s, of ball and free hinges in outboard axes.
         event: (n,) 0; -(i + 1) just before and i + 1 just after event i.
         status: why it ended; None if it was interrupted.
         statistics: counts of the integrator; None for runs of other integrators.
-        settings: how the run was made.
-        meshes: contents of the mesh files of shapes by their paths, of a result that was loaded.
-        checkpoint: the file that keeps the run until its result is saved; None without one.
+        settings: settings of the run.
+        meshes: contents of the mesh files of shapes by their paths, of a loaded result.
+        checkpoint: the file that stores the run until its result is saved; None without one.
     """
 
     @property
     def trusted(self) -> bool:
-        """True where nothing speaks against the numbers: a success whose balances and estimated
-        error (certify=True) are within bounds and whose models stayed within their range.
+        """True if there is no objection to the result.
 
-        `certificate.verdict(accuracy, balance)` takes bounds of your own and gives the reasons.
+        A success whose balances and estimated error (certify=True) are within bounds and whose
+        models stayed within their range. `certificate.verdict(accuracy, balance)` accepts other
+        bounds and gives the reasons.
         """
         return self.certificate.trusted
 
@@ -57,8 +57,11 @@ class Result(Record, NotebookDisplay):
         return build_certificate(self, self._error)
 
     def pictures(self) -> tuple[str, ...]:
-        """Every further name that `plot` takes, for panels of flexible bodies: "shape" (all of
-        them), "blade.shape", "blade.deflection" (along the beam), "blade.modal_energy"."""
+        """Names of the shape panels that `plot` accepts.
+
+        "shape" (all flexible bodies), "blade.shape", "blade.deflection" (along the beam),
+        "blade.modal_energy".
+        """
         from .flexible.shape_panels import panel_names
 
         return tuple(panel_names(self))
@@ -69,7 +72,7 @@ class Result(Record, NotebookDisplay):
 
         return default_candidates(self)
 
-    # --- out ------------------------------------------------------------------------------------
+    # --- export ---------------------------------------------------------------------------------
 
     def to_xarray(self) -> Any:
         """`xarray.Dataset` of every quantity with dimensions, units and provenance (extra: io)."""
@@ -78,11 +81,11 @@ class Result(Record, NotebookDisplay):
         return to_dataset(self)
 
     def save(self, path: str | Path) -> Path:
-        """Write ".nc" (NetCDF, extra: io), ".csv" (a column per number) or ".mat" (for MATLAB, a
-        variable per number); returns the path.
+        """Write ".nc" (NetCDF, extra: io), ".csv" or ".mat" (MATLAB); returns the path.
 
-        The file appears under its name when it is whole; then the checkpoint of a run that has
-        ended is removed.  EnvironmentFailure if the extra is missing or the file cannot be written.
+        ".csv" has a column and ".mat" a variable for every scalar. The file appears under its name
+        when it is complete; then the checkpoint of a run that has ended is removed.
+        EnvironmentFailure if the extra is missing or the file cannot be written.
         """
         from .export.result_files import save_result
 
@@ -92,7 +95,7 @@ class Result(Record, NotebookDisplay):
         return saved
 
     def table(self, *names: str, rows: int = 12) -> str:
-        """A text table of some samples; by default of every hinge coordinate and the energy."""
+        """Text table of some samples; by default of every hinge coordinate and the energy."""
         from .export.text_table import text_table
 
         return text_table(self, names, rows)
@@ -110,21 +113,21 @@ class Result(Record, NotebookDisplay):
     ) -> Any:
         """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
 
-        Names of `pictures` draw flexible bodies.  Without names: the shapes of flexible bodies, and
+        Names of `pictures` draw flexible bodies. Without names: the shapes of flexible bodies, and
         of the outputs of the scene, or else of coordinates, Euler angles and deflections, those
-        that move most; the legend says what was left out.  With `path`, also written there (.png,
+        that move most; the legend notes what was left out. With `path`, also written there (.png,
         .svg, .pdf).
 
         Args:
-            ax: axes of a figure of yours to draw into, or a list with one for each panel.
-            against: a quantity to draw over, instead of the time.
+            ax: axes of an existing figure to draw into, or a list with one for each panel.
+            against: a quantity on the x axis, instead of the time.
             kind: "time"; "phase", the rate of each quantity over itself; "spectrum", amplitudes
-                over the frequency in Hz (Hann's window, the mean taken away).
+                over the frequency in Hz (Hann's window, mean subtracted).
             beside: other runs by their labels, drawn into the same panels; `label` is that of this
-                one.  They may be files of columns, or of other scenes.
+                one. They may be files of columns, or of other scenes.
 
-        Raises SceneError for names, kinds and files that there are not, and for a phase or spectrum
-        of what has none.
+        Raises SceneError for unknown names, kinds and files, and for quantities without a phase or
+        spectrum.
         """
         from .plotting.figure import plot_of
 
@@ -141,14 +144,13 @@ class Result(Record, NotebookDisplay):
         speed: float | None = None,
         title: str | None = None,
     ) -> SceneView:
-        """The run in three dimensions, to look at; with `path` also written there, see
-        `SceneView.save`.
+        """Three-dimensional view of the run; with `path` also written there, see `SceneView.save`.
 
-        Bodies are drawn by their ends, mass centres and inertia, or by the shapes that the scene
-        gives them; deflections of beams are as they are.  `trails` are ends whose ways are drawn;
-        `speed` is how many seconds of the run pass in one, by itself 1, or for runs below 1.5 s or
-        above 20 s what makes a film of some seconds.  SceneError for an end that there is not and
-        for a run without samples.
+        Bodies are drawn by their ends, mass centres and inertia, or by the shapes given in the
+        scene; deflections of beams are not scaled. `trails` are ends whose paths are drawn; `speed`
+        is the number of seconds of the run per second of film, by default 1, or, for runs below 1.5
+        s or above 20 s, chosen for a film of some seconds. SceneError for an unknown end and for a
+        run without samples.
         """
         from .scene3d.view import make_view
 
@@ -168,7 +170,7 @@ class Result(Record, NotebookDisplay):
         trails: Sequence[str] = (),
     ) -> Path:
         """Write a self-contained report; see `mstmm.write_report`, which this calls."""
-        # by name: the equations come from derive, which this room does not know
+        # by name: the equations come from derive, which this package must not import
         report = import_module("mstmm").write_report
         report_path: Path = report(self, path, title=title, quantities=quantities, trails=trails)
         return report_path

@@ -30,14 +30,14 @@ from .observations import Observations
 from .quantities import Quantities
 from .quantity_names import Quantity
 
-#: States below this have finite energies in any scene that stands for something.
+#: States below this have finite energies in any realistic scene.
 _MAX_SAFE_MAGNITUDE = 1e60
 
 
 class Record(FlexibleResults, ABC):
-    """States of a run, and everything that follows from them, over the sample times.
+    """States of a run and all derived quantities over the sample times.
 
-    `Result` says what its attributes are; it adds what vouches for them, and the ways out.
+    See `Result` for the attributes; it adds the certificate and the export.
     """
 
     model: CompiledScene
@@ -63,7 +63,7 @@ class Record(FlexibleResults, ABC):
         self._quantities = Quantities(self._observed, self)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickled are the model, the run and meshes; what follows from them is computed again."""
+        """Pickle the model, the run and meshes; derived quantities are computed again."""
         return (
             type(self),
             (self.model, self.trajectory, self._error),
@@ -72,21 +72,24 @@ class Record(FlexibleResults, ABC):
 
     @property
     def success(self) -> bool:
-        """True if the run reached its end or an event was asked to stop it, with finite numbers:
-        states, energies and momenta of every sample.  Bounces that come to rest end a run before
-        its time, which is no success.  It does not say that numbers are right: see `trusted`.
+        """True if the run reached its end or a requested event with finite values.
+
+        Finite are states, energies and momenta of every sample. Bounces that come to rest end a run
+        early, which is no success. It does not imply that the result is accurate: see `trusted`.
         """
         return self.is_comparable and self.status is not Status.CAME_TO_REST
 
     @property
     def is_comparable(self) -> bool:
-        """True if the run can be compared with others of the scene: a success, or one that ended
-        early because bounces came to rest."""
+        """True if the run can be compared with others of the scene.
+
+        A success, or a run that ended early because bounces came to rest.
+        """
         return self.trajectory.is_comparable and not self._unusable
 
     @property
     def message(self) -> str:
-        """Why the run ended, as a sentence; and which of its samples cannot be used."""
+        """Reason why the run ended, as a sentence, and which of its samples cannot be used."""
         text, unusable = self.trajectory.message, self._unusable
         if not unusable or not self.trajectory.is_comparable:
             return text
@@ -95,7 +98,7 @@ class Record(FlexibleResults, ABC):
 
     @cached_property
     def _step(self) -> StepCheck | None:
-        """The fixed step at the beginning; looked at here, so that a run costs nothing for it."""
+        """Check of the fixed step at the start, made here so that a run does not pay for it."""
         run = self.trajectory
         if run.start is None and not len(run.t):
             return None
@@ -120,18 +123,20 @@ class Record(FlexibleResults, ABC):
 
     @property
     def methods(self) -> tuple[MethodSegment, ...]:
-        """What method="auto" did: each method with its begin (s), reason and fastest motion (1/s);
-        empty for a run whose method was given."""
+        """Segments of method="auto": method, start (s), reason and fastest motion (1/s).
+
+        Empty for a run with a given method.
+        """
         return self.trajectory.methods
 
     @property
     def error_estimate(self) -> AchievedError | None:
-        """What was reached of the error that `simulate(error=...)` asked for; None without one."""
+        """Achieved error for the target `simulate(error=...)`; None without a target."""
         return self.trajectory.reached
 
     @property
     def last_state(self) -> tuple[float, Array, Array]:
-        """(t, q, u) of the last good state: the end, or what a failure left."""
+        """Last valid state (t, q, u): the end, or the last one before a failure."""
         state = self.trajectory.last
         return (float(self.t[-1]), self.q[-1], self.u[-1]) if state is None else state
 
@@ -142,8 +147,10 @@ class Record(FlexibleResults, ABC):
 
     @property
     def risks(self) -> tuple[Risk, ...]:
-        """Everything that was seen to ask for attention, in the scene, before the run and in what
-        it gave: doubts first, then what is only worth knowing; empty for a clean run."""
+        """Findings about the scene, before the run and in its result; empty for a clean run.
+
+        Objections first, then notes.
+        """
         certificate_risks = self.certificate.risks
         texts = {str(risk) for risk in certificate_risks}
         return (
@@ -153,8 +160,10 @@ class Record(FlexibleResults, ABC):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is worth knowing before the numbers are used, one sentence each: the risks, unless
-        the run was to ignore them, and notes of what went wrong beside it."""
+        """Findings, one sentence each, and notes on secondary failures.
+
+        Findings are left out if the run was to ignore them.
+        """
         risks = self.risks if self.trajectory.told else ()
         notes, failures = self.trajectory.notes, self._observed.failures
         return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
@@ -168,7 +177,7 @@ class Record(FlexibleResults, ABC):
     def position(self, reference: str) -> Array:
         """Position (n, 3) in m of "rod1" (its origin) or "rod1.tip".
 
-        Here and below: SceneError, with the nearest name, for one that is not in the scene.
+        Here and below: SceneError, with the nearest name, for an unknown name.
         """
         return self._quantities.of_body(reference, "position")
 
@@ -198,11 +207,11 @@ class Record(FlexibleResults, ABC):
     # --- hinges ---------------------------------------------------------------------------------
 
     def coordinate(self, hinge: str) -> Array:
-        """Coordinates (n, nq) of one hinge; of a flexible body the modal ones."""
+        """Coordinates (n, nq) of one hinge; of a flexible body the modal coordinates."""
         return self.q[:, self._quantities.slots(hinge).q_slice]
 
     def speed(self, hinge: str) -> Array:
-        """Speeds (n, nu) of one hinge; of a flexible body the modal ones."""
+        """Speeds (n, nu) of one hinge; of a flexible body the modal speeds."""
         return self.u[:, self._quantities.slots(hinge).u_slice]
 
     def force(self, hinge: str) -> Array:
@@ -218,7 +227,7 @@ class Record(FlexibleResults, ABC):
         return self._quantities.effort(hinge)
 
     def layout(self, hinge: str) -> HingeSlots:
-        """Names, units and places of a hinge's coordinates and speeds."""
+        """Names, units and slots of a hinge's coordinates and speeds."""
         return self._quantities.slots(hinge)
 
     @property
@@ -233,12 +242,12 @@ class Record(FlexibleResults, ABC):
         return self._quantities.sum("energy")
 
     def energies(self) -> dict[str, Array]:
-        """The three parts of the energy, (n,) each in J: kinetic, gravity, springs."""
+        """Parts of the energy, (n,) each in J: kinetic, gravity, springs."""
         names = ("kinetic", "gravity", "springs")
         return {name: self._quantities.sum(f"energy.{name}") for name in names}
 
     def power(self) -> Array:
-        """Power (n,) in W of everything that is not stored: dampers, efforts, loads, drives."""
+        """Power (n,) in W of all non-conservative loads: dampers, efforts, loads, drives."""
         return self._quantities.sum("power")
 
     @property
@@ -255,13 +264,13 @@ class Record(FlexibleResults, ABC):
         return self._quantities.sum("angular_momentum")
 
     def outputs(self) -> dict[str, Array]:
-        """Outputs of the scene by their names, (n,) each or (n, 3), (n, 4) of vectors."""
+        """Outputs of the scene by name, (n,) each or (n, 3), (n, 4) for vectors."""
         return {name: self.quantity(name).values for name in self._quantities.outputs()}
 
     # --- by name --------------------------------------------------------------------------------
 
     def names(self) -> tuple[str, ...]:
-        """Every name that `quantity`, `plot` and `table` take."""
+        """All names that `quantity`, `plot` and `table` accept."""
         return tuple(self._quantities.names())
 
     def quantity(self, name: str) -> Quantity:

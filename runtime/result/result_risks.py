@@ -15,7 +15,7 @@ from .certificate_data import Drift
 from .loop_closure_error import MISFIT_REMEDY, MISFIT_RISK, Closure
 from .step_control import StepControl
 
-#: Distance of a quaternion's length from 1 that is a risk.
+#: Deviation of a quaternion's length from 1 that is a risk.
 MAX_LENGTH_ERROR = 1e-3
 
 

@@ -38,7 +38,7 @@ def quantity_of(output: Output, t: Array, known: QuantityLookup) -> Quantity:
 
 
 def single_quantity_name(output: Output) -> str:
-    """The name of the quantity that an output is; "" for an expression."""
+    """Name of the quantity that an output equals; "" for an expression."""
     names, text = output.of.names, output.of.text
     return text if len(names) == 1 and text == names[0].text != "t" else ""
 
@@ -66,7 +66,7 @@ def _long_name(output: Output) -> str:
 
 
 def _name_values(name: Name, t: Array, known: QuantityLookup) -> Array:
-    """The values (n,) of a name in an expression."""
+    """Values (n,) of a name in an expression."""
     if name.text == "t":
         return t
     quantity = known(name.text)
@@ -79,7 +79,7 @@ def _name_values(name: Name, t: Array, known: QuantityLookup) -> Array:
 
 
 def expression_kernel(expression: Expression) -> KernelIR:
-    """The kernel names (k,) -> value (1,) of an expression, its names in their order."""
+    """Kernel names (k,) -> value (1,) of an expression, with its names in order."""
     graph = Graph()
     indices = {name: k for k, name in enumerate(expression.names)}
     node = expression.build(graph, lambda name: graph.element("names", indices[name]))

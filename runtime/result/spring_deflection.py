@@ -1,7 +1,7 @@
-"""Deflection of stiff springs, which the error estimate of a run does not count.
+"""Deflection of stiff springs, which the error estimate of a run does not include.
 
-A stiff spring often stands for a constraint.  To the equations it is a spring like any other, so
-that what it gives by is part of their solution, however accurate the run.
+A stiff spring often models a constraint. The equations treat it like any other spring, so its
+deflection is part of their solution, however accurate the run.
 """
 
 from __future__ import annotations
@@ -24,8 +24,11 @@ _MAX_SPRINGS = 200
 
 
 def stiffest_spring_deflection(result: Record) -> SpringDeflection | None:
-    """Of the springs and bushings between ends and of hinges with all motions free; None where
-    there is none, where nothing was sampled, and for scenes of very many."""
+    """Largest deflection of the stiffest spring of a scene.
+
+    Of the springs and bushings between ends and of hinges with all motions free; None if there are
+    none, without samples, and for scenes with too many springs.
+    """
     scene = result.model.scene
     springs = [s for s in scene.spring if s.type == "spring" and s.law.stiffness > 0]
     mounts = [h for h in scene.hinge if h.facts is not None and h.facts.free_body]

@@ -1,8 +1,7 @@
-"""How the steps of a run were controlled: how well it can be expected to keep energy and momentum,
-and which control would keep them better.
+"""Step control of a run: expected drift of energy and momentum, and better settings.
 
-Control of local errors lets energy drift by up to nine times the tolerance, and motions err by four
-to sixty times the drift, relative to what moves; both counted on the runs of
+Control of local errors lets energy drift by up to nine times the tolerance, and errors of motions
+are four to sixty times the drift, relative to what moves; both counted on the runs of
 benchmarks/risk_checks.
 """
 
@@ -15,37 +14,37 @@ from ..integrate.settings import Settings
 from ..integrate.steppers import get, names
 from .verdict import DEFAULT_ACCURACY, DEFAULT_DRIFT
 
-#: Drift beyond which energy and momentum are not kept, whatever was asked: what moves errs by about
-#: ACCURACY.
+#: Drift above which energy and momentum are not conserved, for any settings: the error of the
+#: motion is then about `DEFAULT_ACCURACY`.
 MAX_DRIFT = DEFAULT_ACCURACY / 20
 
 #: Drift that control of local errors leaves, in tolerances.
 _DRIFT_PER_TOLERANCE = 10.0
 
-#: What is named instead is to leave this part of the bound.
+#: Recommended settings are to leave this part of the bound.
 _SAFETY_FACTOR = 0.2
 
-#: Drifts fall by less than the order of a method while steps are long: by this part of it, and by
-#: no more than the second.
+#: Drifts decrease by less than the order of a method while steps are long: by this part of it, and
+#: at most by the second value.
 _ORDER_REDUCTION, _MAX_DRIFT_ORDER = 0.75, 4.0
 
 #: Tolerances below this are rounding.
 _MIN_TOLERANCE = 1e-13
 
-#: Order of methods that have no tableau.
+#: Order assumed for methods without a tableau.
 _DEFAULT_ORDER = 2
 
 
 @dataclass(frozen=True)
 class StepControl:
-    """Fixed steps of a method of an order, or tolerances, or an error that was asked for.
+    """Fixed steps of a method of an order, tolerances, or a target error.
 
     Attributes:
-        step: s; None for steps that the method chose.
+        step: s; None for adaptive steps.
         rtol, atol: its tolerances.
         order: of the method.
-        asked: error that was wanted of the whole run, in parts or rad; 0 where in other units, None
-            where none was.
+        asked: target error of the whole run, relative or in rad; 0 if in other units, None without
+            a target.
     """
 
     step: float | None

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from ..run.error_estimate import ANGLE
 
-#: Relative drift of energy or momentum up to which a run is trusted unless other bounds are asked.
+#: Default limit of the relative drift of energy or momentum of a trusted run.
 DEFAULT_DRIFT = 1e-5
 
-#: Error up to which a run is trusted: rad of an angle, part of the motion of other coordinates.
+#: Default limit of the error: rad of an angle, relative to the motion of other coordinates.
 DEFAULT_ACCURACY = ANGLE
 
 
@@ -19,9 +19,9 @@ class Verdict:
     """Verdict on a result within given bounds.
 
     Attributes:
-        against: what speaks against them, one sentence each.
-        missing: what nobody has looked at.
-        bounds: what was asked for, in words.
+        against: objections, one sentence each.
+        missing: what was not checked.
+        bounds: the requested bounds, in words.
     """
 
     against: tuple[str, ...]
