@@ -1,4 +1,4 @@
-"""Columns of numbers over time, as CSV and MATLAB files hold them: without the scene."""
+"""CSV and MATLAB files of columns over time, without the scene."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from .csv_and_mat import TABLES, write_table
 #: "shoulder.angle [rad]", "rod.qw".
 _HEADING_PATTERN = re.compile(r"(.*?)(?: \[(.*)\])?")
 
-#: No scene has so many events.
+#: Upper bound of the number of events of a scene.
 _MAX_EVENT = 2**53
-#: Columns whose time derivative is another one, by the ends of their names.
+#: Columns whose time derivative is another column, by the ends of their names.
 _RATE_SUFFIXES = {"x": "vx", "y": "vy", "z": "vz", "vx": "ax", "vy": "ay", "vz": "az"}
 
 
@@ -41,11 +41,11 @@ class _NotInColumnsError(SceneError, AttributeError):
 
 
 class ColumnFile:
-    """A result that was saved without its scene: every column by its name, and no more.
+    """Result that was saved without its scene: columns by name.
 
     `t` (n,) in s and `event` (n,) are as in `Result`, and so are `names`, `quantity`, `plot`,
-    `table` and `save` (".csv", ".mat").  Whatever else a `Result` has raises SceneError, with the
-    way out.
+    `table` and `save` (".csv", ".mat"). All other attributes of a `Result` raise SceneError, with a
+    remedy.
     """
 
     def __init__(
@@ -53,15 +53,15 @@ class ColumnFile:
     ) -> None:
         self.path, self.t, self.event = path, t, event
         self._columns = dict(columns)
-        #: What a `Result` has besides.
+        #: Further attributes of a `Result`, not available here.
         self.lost: frozenset[str] = frozenset()
 
     def names(self) -> tuple[str, ...]:
-        """Every name that `quantity` takes."""
+        """All names that `quantity` accepts."""
         return tuple(self._columns)
 
     def quantity(self, name: str) -> Quantity:
-        """Values (n,) with their unit; SceneError with the nearest name if there is no such one."""
+        """Values (n,) with their unit; SceneError with the nearest name for an unknown name."""
         if name not in self._columns:
             return self._vector(name)
         unit, values = self._columns[name]
@@ -70,7 +70,7 @@ class ColumnFile:
         return Quantity(name, values, unit, name, rates=rates)
 
     def _vector(self, name: str) -> Quantity:
-        """Of the columns that are its components, as results name them."""
+        """Vector of the columns that are its components, with the names used by results."""
         owner, _, kind = name.rpartition(".")
         kind_description = _VECTOR_KINDS.get(kind)
         candidates = [
@@ -91,30 +91,29 @@ class ColumnFile:
         raise SceneError(f'"{name}": there is no such column in {self.path}{hint}')
 
     def candidates(self) -> list[Candidate]:
-        """Coordinates, which have a rate beside them; without such all angles and lengths, or all
-        columns."""
+        """Columns with a rate; without any, all angles and lengths, or all columns."""
         coordinates = [name for name in self._columns if f"{name}_rate" in self._columns]
         lengths = [name for name, (unit, _) in self._columns.items() if unit in ("rad", "m")]
         return list(rate_candidates(self, coordinates or lengths or list(self._columns)))
 
     def scalars(self) -> list[Quantity]:
-        """Every column."""
+        """All columns."""
         return [self.quantity(name) for name in self._columns]
 
     def table(self, *names: str, rows: int = 12) -> str:
-        """As `Result.table`."""
+        """Text table of some samples, as `Result.table`."""
         from .text_table import text_table
 
         return text_table(self, names, rows, sorted({"energy"} & self._columns.keys()))
 
     def plot(self, *names: str, **options: Any) -> Any:
-        """As `Result.plot`."""
+        """Figure of columns by name, as `Result.plot`."""
         from ..plotting.figure import plot_of
 
         return plot_of(self, names, **options)
 
     def save(self, path: str | Path) -> Path:
-        """As `Result.save`, to ".csv" or ".mat"."""
+        """Write ".csv" or ".mat", as `Result.save`."""
         path = require_path("result file", path)
         if path.suffix.lower() not in TABLES:
             raise SceneError(
@@ -143,7 +142,7 @@ class ColumnFile:
 
 
 def read_csv(path: Path) -> ColumnFile:
-    """A table that `Result.save` wrote.  SceneError for any other, with the line at fault."""
+    """Read a table that `Result.save` wrote. SceneError for any other, with the invalid line."""
     try:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.reader(file))
@@ -174,7 +173,7 @@ def _parse_heading(text: str) -> tuple[str, str]:
 
 
 def read_mat(path: Path) -> ColumnFile:
-    """A file that `Result.save` wrote.  SceneError for any other."""
+    """Read a file that `Result.save` wrote. SceneError for any other."""
     from scipy.io import loadmat
 
     try:
@@ -183,7 +182,7 @@ def read_mat(path: Path) -> ColumnFile:
                  for row in data["names"]]  # fmt: skip
         t, event = np.ravel(data["t"]), np.ravel(data["event"])
         columns_by_name = {name: (unit, np.ravel(data[key])) for key, name, unit in names}
-    except Exception as error:  # whatever SciPy makes of files that are none
+    except Exception as error:  # SciPy raises many types for invalid files
         raise _file_error(
             path, f"not a result of mstmm ({type(error).__name__}: {error})"
         ) from None
@@ -193,7 +192,7 @@ def read_mat(path: Path) -> ColumnFile:
 def _build_columns(
     path: Path, t: Array, event: Array, found: Mapping[str, tuple[str, Array]]
 ) -> ColumnFile:
-    """What a file holds, where it can be that of a run."""
+    """Columns of a file, if it can be that of a run."""
     columns = [t, event, *(values for _, values in found.values())]
     if any(len(column) != len(t) for column in columns):
         raise _file_error(path, "its columns are not equally long")
@@ -210,5 +209,5 @@ def _file_error(path: Path, why: str) -> SceneError:
     return SceneError(f'result file "{path}": {why}; save the result again')
 
 
-#: Readers by the endings of files.
+#: Readers by file suffix.
 READERS: dict[str, Callable[[Path], ColumnFile]] = {".csv": read_csv, ".mat": read_mat}

@@ -1,4 +1,4 @@
-"""Tables of numbers over time: CSV and MATLAB's files, a column for every number."""
+"""CSV and MATLAB tables over time, with a column for every scalar."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from ..quantity_names import Quantity
 def write_table(
     t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, scene: str = ""
 ) -> Path:
-    """Scalar quantities at the times t (n,) s, and events (n,); the suffix is one of TABLES."""
+    """Write scalar quantities and events (n,) at the times t (n,) s; the suffix is in `TABLES`."""
     with replace_atomically(path) as temporary:
         TABLES[path.suffix.lower()](t, event, quantities, temporary, scene)
     return path
 
 
 def column_heading(quantity: Quantity) -> str:
-    """Name and unit above a column."""
+    """Heading of a column: name and unit."""
     return f"{quantity.name} [{quantity.unit}]" if quantity.unit else quantity.name
 
 
 def matlab_names(names: Sequence[str]) -> list[str]:
-    """Names that MATLAB takes, no two alike: letters, digits and _, 63 of them at most."""
+    """Unique names valid in MATLAB: letters, digits and _, at most 63 characters."""
     taken, result = {"t", "event", "names", "scene"}, []
     for name in names:
         text = re.sub(r"\W", "_", name)
@@ -49,7 +49,7 @@ def matlab_names(names: Sequence[str]) -> list[str]:
 def _write_csv(
     t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, _: str
 ) -> None:
-    """One row per sample, one column per number; the header holds names and units."""
+    """One row per sample, one column per scalar; the header holds names and units."""
     header = ["time [s]", "event", *map(column_heading, quantities)]
     columns = [t.tolist(), event.tolist(), *(q.values.tolist() for q in quantities)]
     with path.open("w", newline="", encoding="utf-8") as file:
@@ -61,7 +61,7 @@ def _write_csv(
 def _write_mat(
     t: Array, event: Integers, quantities: Sequence[Quantity], path: Path, scene: str
 ) -> None:
-    """A variable per number; `names` has a row for each: MATLAB's name, ours, the unit."""
+    """One variable per scalar; `names` has a row for each: MATLAB's name, original name, unit."""
     from scipy.io import savemat
 
     keys = matlab_names([quantity.name for quantity in quantities])
@@ -77,7 +77,7 @@ def _write_mat(
         savemat(file, data, long_field_names=True, do_compression=True)
 
 
-#: Writers by the endings of files.
+#: Writers by file suffix.
 TABLES: dict[str, Callable[[Array, Integers, Sequence[Quantity], Path, str], None]] = {
     ".csv": _write_csv, ".mat": _write_mat,
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Where a result comes from: scene, settings, versions, kernels; to attributes and back."""
+"""Provenance of a result: scene, settings, versions, kernels; to attributes and back."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def program_versions() -> dict[str, str]:
 
 
 def file_attributes(result: Record) -> dict[str, Any]:
-    """Attributes of the file: text, so that any reader of NetCDF shows them."""
+    """File attributes as text, so that every reader of NetCDF shows them."""
     run = result.trajectory
     settings = asdict(run.settings)
     settings.pop("output_times")
@@ -81,7 +81,7 @@ def file_attributes(result: Record) -> dict[str, Any]:
 
 
 def provenance_variables(result: Record) -> dict[str, Variable]:
-    """What is too long for an attribute, or has a dimension of its own."""
+    """Provenance that is too long for an attribute, or has its own dimension."""
     run = result.trajectory
     scene = {"long_name": "scene as TOML, defaults filled in"}
     event = {"long_name": "-(i + 1) just before, i + 1 just after event i"}
@@ -120,7 +120,7 @@ def provenance_variables(result: Record) -> dict[str, Variable]:
 
 
 def _error_variables(error: ErrorEstimate | None) -> dict[str, Variable]:
-    """The estimated error over time, one column per unit."""
+    """Estimated error over time, one column per unit."""
     if error is None:
         return {}
     long_name = "times that both runs reached"
@@ -137,7 +137,7 @@ def _error_variables(error: ErrorEstimate | None) -> dict[str, Variable]:
 
 
 def error_estimate(data: Any) -> ErrorEstimate | None:
-    """The estimate again; None if there was none."""
+    """Error estimate of a saved Dataset; None if there was none."""
     columns = [name for name in data if str(name).startswith(("error_q_", "error_u_"))]
     if not columns:
         return None
@@ -155,7 +155,7 @@ def error_estimate(data: Any) -> ErrorEstimate | None:
 
 
 def _read_floats(data: Any, name: str) -> Array:
-    """A variable as numbers; TypeError if it holds anything else."""
+    """Values of a variable as floats; TypeError if it holds anything else."""
     values = data[name].values
     if values.dtype.kind not in "fiu":
         raise TypeError(f"{name} holds {values.dtype}, not numbers")
@@ -163,14 +163,14 @@ def _read_floats(data: Any, name: str) -> Array:
 
 
 def _require_number(value: Any) -> Any:
-    """The same, if it is a number, a truth value or None."""
+    """Require a number, a bool or None, and return it."""
     if value is not None and not isinstance(value, (int, float)):
         raise TypeError(f"{value!r} stands where a number was")
     return value
 
 
 def _read_settings(found: dict[str, Any]) -> Settings:
-    """Settings of values that are of the kind that settings have."""
+    """Settings from saved values; TypeError for values of the wrong type."""
     for name, value in found.items():
         if name not in ("method", "output_times", "scheme", "tangent"):
             _require_number(value)
@@ -183,9 +183,9 @@ def _read_settings(found: dict[str, Any]) -> Settings:
 
 
 def read_trajectory(data: Any) -> Trajectory:
-    """The states of a saved Dataset.
+    """States of a saved Dataset.
 
-    Raises KeyError, ValueError or TypeError where it was changed; sizes are the caller's affair.
+    Raises KeyError, ValueError or TypeError where it was changed; the caller checks sizes.
     """
     a = data.attrs
     times = tuple(_read_floats(data, "output_times").tolist()) if "output_times" in data else None
@@ -194,7 +194,7 @@ def read_trajectory(data: Any) -> Trajectory:
     if statistics is not None:
         newer_counts = ("crossings", "residuals", "tangents", "solves", "iterations",
                  "laws_tangents")  # fmt: skip
-        counts = dict.fromkeys(newer_counts, 0) | statistics  # older files do not tell of them
+        counts = dict.fromkeys(newer_counts, 0) | statistics  # missing in older files
         statistics = Statistics(
             **{f.name: _require_number(counts[f.name]) for f in fields(Statistics)}
         )

@@ -1,4 +1,4 @@
-"""Results into files: NetCDF through xarray and h5netcdf (extra: io), CSV and MATLAB's."""
+"""Result files: NetCDF through xarray and h5netcdf (extra: io), CSV and MATLAB."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .xarray_dataset import MAX_SPEEDS, to_dataset
 
 
 def save_result(result: Record, path: Path) -> Path:
-    """Write a result; the suffix says how."""
+    """Write a result in the format given by the suffix."""
     if path.suffix.lower() == ".nc":
         return save_dataset(partial(to_dataset, result), path)
     if path.suffix.lower() not in TABLES:
@@ -33,7 +33,7 @@ def save_result(result: Record, path: Path) -> Path:
 
 
 def save_dataset(made: Callable[[], Any], path: Path) -> Path:
-    """Write a Dataset as NetCDF, with a hash of itself at its end."""
+    """Write a Dataset as NetCDF, followed by its hash."""
     with replace_atomically(path) as temporary:
         _write_netcdf(made(), temporary)
     return path
@@ -49,12 +49,12 @@ def _write_netcdf(data: Any, path: Path) -> None:
     seal(path)
 
 
-#: Bytes of a NetCDF file beside its arrays, generously.
+#: Upper bound of the bytes of a NetCDF file in addition to its arrays.
 _NETCDF_OVERHEAD = 2_000_000
 
 
 def _require_disk_space(size: int, path: Path) -> None:
-    """EnvironmentFailure if the disk is too full.  HDF5 crashes the process where it runs full."""
+    """EnvironmentFailure if the disk is too full, because HDF5 crashes the process then."""
     free = shutil.disk_usage(path.parent).free
     if free < size:
         raise EnvironmentFailure(

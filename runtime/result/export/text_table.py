@@ -1,4 +1,4 @@
-"""A short text table of a result for the terminal."""
+"""Short text table of a result for the terminal."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
     from ..plotting.plot_sources import PlotSource
     from ..quantity_names import Quantity
 
-#: Columns of a table nobody chose the columns of.
+#: Default number of columns of a table.
 _DEFAULT_COLUMNS = 6
 
 
 def default_names(result: PlotSource, most: int = _DEFAULT_COLUMNS) -> list[str]:
-    """What `plot` draws if nobody chose, a name for each column."""
+    """Names of the default quantities of `plot`, one for each column."""
     return [name for chosen in choose_panels(result, most) for name in chosen.names][:most]
 
 
 def flat_columns(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndarray]]:
-    """(name, unit, values (n,)) of every column."""
+    """Name, unit and values (n,) of every column."""
     columns = []
     for quantity in quantities:
         if quantity.values.ndim == 1:
@@ -39,8 +39,10 @@ def flat_columns(quantities: Sequence[Quantity]) -> list[tuple[str, str, np.ndar
 def text_table(
     result: PlotSource, names: Sequence[str], rows: int, beside: Sequence[str] = ("energy",)
 ) -> str:
-    """Aligned columns with a line of units; `rows` samples spread evenly over time.  Where nobody
-    chose names, some are chosen, and `beside` stands beside them."""
+    """Aligned columns with a line of units; `rows` samples spread evenly over time.
+
+    Without names, default quantities are chosen, followed by the names in `beside`.
+    """
     selected = list(names) or [*default_names(result), *beside]
     columns = [("t", "s", result.t), *flat_columns([result.quantity(name) for name in selected])]
     samples = _evenly_spaced_samples(
@@ -60,7 +62,7 @@ def text_table(
 
 
 def _evenly_spaced_samples(t: np.ndarray, rows: int) -> list[int]:
-    """Samples next to `rows` evenly spaced times, first and last among them."""
+    """Samples next to `rows` evenly spaced times, including the first and last."""
     if len(t) <= rows:
         return list(range(len(t)))
     targets = np.linspace(t[0], t[-1], max(2, rows))

@@ -1,4 +1,4 @@
-"""A result as one xarray Dataset: every quantity with its dimensions, unit and long name."""
+"""Result as an xarray Dataset: all quantities with dimensions, units and long names."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from ..result_record import Record
 
 
-#: Speeds of a scene up to which everything about every body and hinge is written out.
+#: Largest number of speeds of a scene for which all bodies and hinges are written.
 MAX_SPEEDS = 5000
 _OPTIONAL_LABELS = ("body", "hinge", "flexible", "mode")
 
 
 def to_dataset(result: Record) -> Any:
-    """`xarray.Dataset` with dimensions time, coordinate, speed, hinge, body, axis, component,
-    angle, and spring, load and so on where there are some.
+    """`xarray.Dataset` of a result.
 
-    `body` holds bodies and their ends ("rod1", "rod1.tip"), `coordinate` and `speed` the entries of
-    q and u ("shoulder.angle", "shoulder.angle_rate"), whose units differ and stand beside them.
-    Beyond MOST_SPEEDS speeds motions of bodies and loads of hinges are left out: they follow from
-    the states, and a loaded result computes those that are asked for.
+    Dimensions are time, coordinate, speed, hinge, body, axis, component, angle, and, where they
+    exist, spring, load and so on. `body` holds bodies and their ends ("rod1", "rod1.tip"),
+    `coordinate` and `speed` the entries of q and u ("shoulder.angle", "shoulder.angle_rate"), with
+    the unit of each as a variable. Above `MAX_SPEEDS` speeds, motions of bodies and loads of hinges
+    are left out: they follow from the states, and a loaded result computes them on demand.
     """
     try:
         import xarray
@@ -55,7 +55,7 @@ Variable = tuple[tuple[str, ...], Any, dict[str, str]]
 
 
 def dataset_variables(result: Record) -> tuple[dict[str, Variable], dict[str, Variable]]:
-    """What a run gave, and the labels of its dimensions; see `to_dataset`."""
+    """Variables of a run, and the labels of its dimensions; see `to_dataset`."""
     result_variables, labels = _state_variables(result), _dimension_labels(result)
     if result.model.nu <= MAX_SPEEDS:
         result_variables |= (
@@ -76,7 +76,7 @@ def _attributes(unit: str, long_name: str) -> dict[str, str]:
 
 
 def _common_unit(units: list[str]) -> str:
-    """The unit of an array whose columns may have different ones."""
+    """Unit of an array whose columns may have different units."""
     return (units[0] or "1") if len(set(units)) == 1 else "see the units beside the labels"
 
 
@@ -171,8 +171,7 @@ def _hinge_variables(result: Record) -> dict[str, Variable]:
 
 
 def _input_and_output_variables(result: Record) -> dict[str, Variable]:
-    """Inputs, signals and outputs by their names, as "input_motor", "signal_wind" and
-    "output_height"."""
+    """Inputs, signals and outputs, as "input_motor", "signal_wind" and "output_height"."""
     scene, result_variables = result.model.scene, dict[str, Variable]()
     names = {
         "input": [channel.name for channel in scene.input],
@@ -186,8 +185,10 @@ def _input_and_output_variables(result: Record) -> dict[str, Variable]:
 
 
 def _element_variables(result: Record) -> dict[str, Variable]:
-    """What springs, loads, bushings and what closes loops do: "spring_length" by spring; nan for
-    what one of them has not."""
+    """Variables of springs, loads, bushings and loop constraints: "spring_length" by spring.
+
+    nan for quantities that one of them lacks.
+    """
     owners_by_word: dict[str, list[str]] = {}
     quantities_by_kind: dict[tuple[str, str], dict[str, Quantity]] = {}
     for quantity in result._quantities.acting_wholes():
@@ -215,7 +216,7 @@ def _element_variables(result: Record) -> dict[str, Variable]:
 
 
 def _quantity_variables(key: str, known: Quantity) -> dict[str, Variable]:
-    """One variable, or one for each column where these are no axes."""
+    """One variable, or one for each column if the columns are not axes."""
     description = _attributes(known.unit, known.long_name)
     if known.labels in _DIMENSIONS:
         return {key: (("time", *_DIMENSIONS[known.labels]), known.values, description)}

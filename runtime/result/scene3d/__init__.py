@@ -1,1 +1,1 @@
-"""A scene in three dimensions: what it looks like, how it moves, pages and films of it."""
+"""Three-dimensional views of a scene: geometry, motion, pages and films."""

@@ -1,5 +1,4 @@
-"""Arrows whose length goes with what they stand for: straight ones of forces, turned ones of
-moments."""
+"""Arrows with a length proportional to a vector: straight for forces, circular for moments."""
 
 from __future__ import annotations
 
@@ -9,17 +8,20 @@ from mstmm.array_validation import Array
 
 from .solid_meshes import Faces, axes_along, tube_faces
 
-#: Corners once around; a head is so many times as thick and as long as its shaft is thick.
+#: Corners around the shaft; radius of the head by that of the shaft, and its length by it.
 _CORNERS_AROUND, _HEAD_RADIUS_RATIO, _HEAD_LENGTH_RATIO = 10, 2.4, 6.0
-#: Shafts of short arrows are thinner: at most this part of the length, or of a turn's radius.
+#: Shafts of short arrows are thinner: at most this part of the length, or of the radius of a
+#: circular arrow.
 _MAX_RADIUS_TO_LENGTH, _MAX_RADIUS_TO_TURN_RADIUS = 0.1, 0.22
-#: Angle of a turned arrow, and sections of its shaft.
+#: Angle of a circular arrow, and sections of its shaft.
 _TURN_ANGLE, _SHAFT_SECTIONS = 1.5 * np.pi, 16
 
 
 def straight_arrows(at: Array, vector: Array, thick: float) -> tuple[Array, Faces]:
-    """Vertices (f, n, 3) and faces of arrows from points (f, 3) along vectors (f, 3), in m; `thick`
-    (m) is the radius of a shaft."""
+    """Vertices (f, n, 3) and faces of straight arrows from points (f, 3) along vectors (f, 3).
+
+    Lengths in m; `thick` (m) is the radius of a shaft.
+    """
     length = np.linalg.norm(vector, axis=1)
     r = np.minimum(thick, _MAX_RADIUS_TO_LENGTH * length)
     neck = length - _HEAD_LENGTH_RATIO * r
@@ -31,8 +33,10 @@ def straight_arrows(at: Array, vector: Array, thick: float) -> tuple[Array, Face
 
 
 def circular_arrows(at: Array, vector: Array, thick: float) -> tuple[Array, Faces]:
-    """The same about points (f, 3): each arrow turns about its vector (f, 3), right-handed, at the
-    vector's length from the point."""
+    """Vertices (f, n, 3) and faces of circular arrows about points (f, 3).
+
+    Each arrow turns about its vector (f, 3), right-handed, with the vector's length as radius.
+    """
     radius = np.linalg.norm(vector, axis=1)
     r = np.minimum(thick, _MAX_RADIUS_TO_TURN_RADIUS * radius)
     head = np.divide(_HEAD_LENGTH_RATIO * r, radius, out=np.zeros_like(r), where=radius > 0)
@@ -54,7 +58,7 @@ def _arrow_faces(rings: int) -> Faces:
 def _arrow_rings(
     centres: Array, radii: Array, first: Array | tuple[float, ...], second: Array
 ) -> Array:
-    """(f, p, around, 3): circles about centres (f, p, 3) across first x second."""
+    """Circles (f, p, around, 3) about centres (f, p, 3), normal to first x second."""
     angles = 2 * np.pi * np.arange(_CORNERS_AROUND) / _CORNERS_AROUND
     first_axes, second_axes = (
         np.broadcast_to(x, centres.shape)[:, :, None] for x in (first, second)
@@ -64,7 +68,7 @@ def _arrow_rings(
 
 
 def _place_rings(rings: Array, at: Array, vector: Array) -> Array:
-    """(f, n, 3): z along the vectors, the origin at the points."""
+    """Vertices (f, n, 3) with z along the vectors and the origin at the points."""
     length = np.linalg.norm(vector, axis=1)
     axes = [
         axes_along(v) if length_of_vector > 0 else np.eye(3)

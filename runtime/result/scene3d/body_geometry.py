@@ -1,4 +1,4 @@
-"""Rigid bodies as they are drawn when nothing is known but their ends, mass and inertia."""
+"""Default geometry of rigid bodies from their ends, mass and inertia."""
 
 from __future__ import annotations
 
@@ -19,28 +19,32 @@ from .solid_meshes import (
     join_surfaces,
 )
 
-#: Radius of a bar by its length, usual and at most, and its bounds by the size of the scene.
+#: Radius of a bar relative to its length, usual and at most, and its bounds relative to the size of
+#: the scene.
 _RADIUS_TO_LENGTH, _MAX_RADIUS_TO_LENGTH, _MIN_RADIUS_TO_SIZE, _MAX_RADIUS_TO_SIZE = (
     0.035,
     0.15,
     0.0025,
     0.012,
 )
-#: Radius of the ball at the mass centre beside that of a bar.
+#: Radius of the ball at the mass centre relative to that of a bar.
 _BALL_RADIUS_RATIO = 1.9
-#: Points closer than this by the size of the scene are one.
+#: Points closer than this, relative to the size of the scene, are identical.
 _POINT_TOLERANCE = 1e-6
-#: A box of equal inertia is drawn if its edges are below this by the size of the scene: beside
-#: bars, and where nothing else is known of a body.
+#: A box of equal inertia is drawn if its edges are below this, relative to the size of the scene:
+#: with bars, and for bodies without other data.
 _MAX_BOX_BESIDE_BARS, _MAX_BOX_ALONE = 0.6, 4.0
 
 
 def rigid_body_solids(
     name: str, body: BodyTable, hub: bool, size: float, colour: Colour
 ) -> Iterator[Solid]:
-    """Bars from the origin (`hub`: something is joined there) or from the mass centre to every end,
-    and a ball at the mass centre; the box of the same mass and inertia where there is no bar, and
-    clear and hidden where there is one.  `size` in m is that of the scene."""
+    """Solids of a rigid body: bars to every end, and a ball at the mass centre.
+
+    Bars start at the origin (`hub`: a hinge is attached there) or at the mass centre. The box of
+    the same mass and inertia is added: visible without bars, transparent and hidden with bars.
+    `size` in m is that of the scene.
+    """
     centre = np.array(body.center_of_mass)
     root = np.zeros(3) if hub or body.type != "rigid" else centre
     points = [np.array(body.end_position(end)) for end in body.ends]
@@ -80,7 +84,7 @@ def bar_radius(length: float, size: float) -> float:
 
 
 def body_bar_radius(body: BodyTable, size: float) -> float:
-    """Radius in m of the thickest bar of a body, or of the thickest there is where it has none."""
+    """Radius in m of the thickest bar of a body, or the largest radius if it has no bar."""
     ends = [np.linalg.norm(body.end_position(end)) for end in body.ends]
     longest = float(max(ends, default=0.0))
     return bar_radius(longest, size) if longest > 0 else _MAX_RADIUS_TO_SIZE * size
@@ -89,8 +93,9 @@ def body_bar_radius(body: BodyTable, size: float) -> float:
 def equal_inertia_box(
     body: BodyTable, size: float, most: float = _MAX_BOX_BESIDE_BARS
 ) -> Surface | None:
-    """The homogeneous box with the same mass, mass centre and inertia; None where there is none or
-    it would hide the scene, larger than `most` times its size.
+    """Homogeneous box with the same mass, mass centre and inertia.
+
+    None if there is none, or if it would hide the scene: larger than `most` times its size.
 
     Edges a, b, c have moments m (b^2 + c^2) / 12 and so on, so a^2 = 6 (Jy + Jz - Jx) / m.
     """
@@ -108,7 +113,7 @@ def equal_inertia_box(
 
 
 def body_centre(body: BodyTable) -> Array:
-    """Where a body is pointed at: its mass centre, or the mean of its ends."""
+    """Label position of a body: its mass centre, or the mean of its ends."""
     if body.type == "rigid" and body.mass:
         return np.array(body.center_of_mass)
     ends = [body.end_position(end) for end in body.ends]

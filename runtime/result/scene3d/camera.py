@@ -1,4 +1,4 @@
-"""From where a stage is looked at."""
+"""Camera position and direction for a scene."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from mstmm.array_validation import Array
 
 from .scene_graph import SceneGraph
 
-#: Opening of the camera upright, rad, its width by its height, and room for the edges.
+#: Vertical field of view of the camera in rad, aspect ratio (width by height), and margin.
 FIELD_OF_VIEW, _ASPECT_RATIO, _FRAME_MARGIN = np.deg2rad(38.0), 1.3, 1.15
-#: Spread across a plane beside that within it up to which a motion is plane.
+#: Largest ratio of out-of-plane to in-plane spread of a planar motion.
 _MAX_PLANE_RATIO = 0.02
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Where it is and what it looks at, (3,) m, and which way is up."""
+    """Position of the camera, point that it looks at, (3,) m, and upward direction."""
 
     position: Array
     look_at: Array
@@ -26,7 +26,7 @@ class Camera:
 
     @property
     def axes(self) -> Array:
-        """(3, 3) rows: to the right, up and towards the camera."""
+        """Axes (3, 3) as rows: to the right, up and towards the camera."""
         view_direction = self.position - self.look_at
         view_direction = view_direction / np.linalg.norm(view_direction)
         right = np.cross(self.up, view_direction)
@@ -35,8 +35,10 @@ class Camera:
 
 
 def choose_camera(stage: SceneGraph) -> Camera:
-    """All in sight: a motion in a plane is seen almost along its normal, any other from aside and
-    above."""
+    """Choose a camera that shows everything.
+
+    A planar motion is viewed almost along its normal, any other obliquely from above.
+    """
     view_direction = _view_direction(stage)
     up = _camera_up(stage.up, view_direction)
     axes = Camera(view_direction, np.zeros(3), up).axes
@@ -53,7 +55,7 @@ def choose_camera(stage: SceneGraph) -> Camera:
 
 
 def _view_direction(stage: SceneGraph) -> Array:
-    """Unit vector from what is looked at to the camera."""
+    """Unit vector from the viewed point to the camera."""
     up = stage.up
     side_direction, ahead_direction = _horizontal_axes(up)
     clouds = [pose.position[:: max(1, len(pose.position) // 40)] for pose in stage.poses.values()]
@@ -70,7 +72,7 @@ def _view_direction(stage: SceneGraph) -> Array:
 
 
 def _horizontal_axes(up: Array) -> tuple[Array, Array]:
-    """Two unit vectors normal to up: the inertial axes where it is one of them."""
+    """Two unit vectors normal to up: the inertial axes if up is one of them."""
     k = int(np.argmax(np.abs(up)))
     first = np.eye(3)[(k + 1) % 3]
     first = first - (first @ up) * up
@@ -79,5 +81,5 @@ def _horizontal_axes(up: Array) -> tuple[Array, Array]:
 
 
 def _camera_up(up: Array, toward: Array) -> Array:
-    """Up, unless the camera looks along it."""
+    """Upward direction, replaced if the camera looks along it."""
     return up if abs(up @ toward) < 0.98 else _horizontal_axes(up)[0]

@@ -1,4 +1,4 @@
-"""Beams as bent tubes, elastic bodies by their meshes."""
+"""Geometry of beams as bent tubes and of elastic bodies by their meshes."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from .solid_meshes import Colour, ellipsoid_surface, tube_faces
 if TYPE_CHECKING:
     from ..result_record import Record
 
-#: Sections of a tube and corners of each.
+#: Sections of a tube and corners of each section.
 _STATION_COUNT, _CORNERS_AROUND = 25, 8
-#: Nodes of a body without a mesh that are drawn.
+#: Largest number of nodes drawn of a body without a mesh.
 _MAX_DRAWN_NODES = 400
 
 
 def beam_tube(
     run: Record, name: str, when: FrameTimes, poses: Poses, size: float, colour: Colour
 ) -> DeformingSurface:
-    """A beam as it bends and twists, deflections as they are."""
+    """Surface of a beam in bending and twist, with unscaled deflections."""
     motion = motion_at(run, name, when, poses)
     length = float(motion.shapes.length)
     x = np.linspace(0.0, length, _STATION_COUNT)
     radius = np.pad(_section_radii(motion, x, length, size), 1, mode="edge")
-    radius = np.pad(radius, 1)  # discs close its ends, whose rims stay sharp
+    radius = np.pad(radius, 1)  # discs close its ends, with sharp rims
     x = np.pad(x, 2, mode="edge")
     angles = 2 * np.pi * np.arange(_CORNERS_AROUND) / _CORNERS_AROUND
     circle = np.stack([np.zeros(_CORNERS_AROUND), np.cos(angles), np.sin(angles)], axis=1)
@@ -46,8 +46,10 @@ def beam_tube(
 def elastic_surface(
     run: Record, name: str, when: FrameTimes, poses: Poses, r: float, colour: Colour
 ) -> DeformingSurface:
-    """An elastic body by the nodes that it was made of, moved by its shapes to first order: its
-    outside where a mesh is known, else every node as a dot of radius r (m)."""
+    """Surface of an elastic body, deformed by its shape functions to first order.
+
+    Its outer surface if a mesh is known, else every node as a dot of radius r (m).
+    """
     motion = motion_at(run, name, when, poses)
     skin = motion.body.skin
     assert skin is not None
@@ -64,7 +66,7 @@ def elastic_surface(
 
 
 def motion_at(run: Record, name: str, when: FrameTimes, poses: Poses) -> observed.Motion:
-    """The body's motion at the moments; rates that a picture has no need of are zero."""
+    """Motion of a body at the frame times; rates that are not drawn are zero."""
     motion = run._flexible.motion(name).some(when.kept)
     eta = when.smooth(motion.eta, motion.etad)
     zero_rates, zero_vectors = np.zeros_like(eta), np.zeros((len(eta), 3))
@@ -84,8 +86,10 @@ def motion_at(run: Record, name: str, when: FrameTimes, poses: Poses) -> observe
 
 
 def _section_radii(shown: observed.Motion, x: Array, length: float, size: float) -> Array:
-    """(m,) m, of the round section with the same ratio of stiffnesses, within what can be seen:
-    EI / EA = r^2 / 4."""
+    """Radii (m,) in m of round sections with the same stiffness ratio, within visible limits.
+
+    EI / EA = r^2 / 4.
+    """
     sections = shown.shapes.sections(x)
     usual_radius = bar_radius(length, size)
     stretch, bend = np.asarray(sections.EA), np.maximum(sections.EI_y, sections.EI_z)

@@ -1,4 +1,4 @@
-"""When a run is looked at, and where everything is in between its samples."""
+"""Frame times of a film of a run, and interpolation between its samples."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from .scene_graph import Poses
 if TYPE_CHECKING:
     from ..result_record import Record
 
-#: Pictures a second, and how long a film should be at least and at most (s).
+#: Frames per second, and least and largest duration of a film (s).
 FRAME_RATE, MIN_DURATION, MAX_DURATION = 30.0, 1.5, 20.0
-#: Places of owners that a film may hold; beyond them it has fewer pictures.
+#: Largest number of poses in a film; beyond, it has fewer frames.
 _MAX_POSES = 90_000
 _MIN_FRAMES = 24
-#: Places of a trail from one picture to the next.
+#: Points of a trail from one frame to the next.
 _TRAIL_POINTS_PER_FRAME = 4
 _SPEED_EXPECTATION = "seconds of the run that pass in one second, above 0"
 
 
 @dataclass(frozen=True)
 class FrameTimes:
-    """The moments of a film of a run.
+    """Frame times of a film of a run.
 
     Attributes:
-        kept: samples of the run that can be drawn; two at the same time stand before and behind an
-            event.
+        kept: samples of the run that can be drawn; two at the same time are those before and after
+            an event.
         t: (n,) s, their times.
-        times: (f,) s, the moments.
+        times: (f,) s, the frame times.
         speed: seconds of the run per second of film.
     """
 
@@ -52,10 +52,10 @@ class FrameTimes:
     def of(
         cls, run: Record, owners: int, speed: float | None, most: int | None = None
     ) -> FrameTimes:
-        """Moments for a scene of so many bodies and hinges.
+        """Frame times for a scene with `owners` bodies and hinges.
 
-        `speed` by itself is 1, or for short and long runs what gives a film of some seconds.
-        SceneError for a run without a sample.
+        `speed` defaults to 1, or, for short and long runs, is chosen for a film of some seconds.
+        SceneError for a run without samples.
         """
         finite = np.flatnonzero(np.isfinite(run.q).all(axis=1))
         if not len(finite):
@@ -80,7 +80,7 @@ class FrameTimes:
         return len(self.times) == len(self.t) and bool(np.array_equal(self.times, self.t))
 
     def smooth(self, values: Array, rates: Array) -> Array:
-        """Values (n, ...) with their time rates at the moments, by cubic Hermite pieces."""
+        """Values (n, ...) with their time rates at the frame times, by cubic Hermite pieces."""
         if self._exact:
             return values
         from scipy.interpolate import CubicHermiteSpline
@@ -91,7 +91,7 @@ class FrameTimes:
         return self._pieces(values, between)
 
     def straight(self, values: Array) -> Array:
-        """Values (n, k) at the moments, straight between samples."""
+        """Values (n, k) at the frame times, interpolated linearly between samples."""
 
         def between(part: slice, at: Array) -> Array:
             columns = [np.interp(at, self.t[part], column) for column in values[part].T]
@@ -100,7 +100,7 @@ class FrameTimes:
         return self._pieces(values, between)
 
     def turned(self, quaternions: Array) -> Array:
-        """Quaternions (n, 4) at the moments, w first, at even rates between samples."""
+        """Quaternions (n, 4), w first, at the frame times, at constant rates between samples."""
         from scipy.spatial.transform import Rotation, Slerp
 
         def between(part: slice, at: Array) -> Array:
@@ -111,8 +111,10 @@ class FrameTimes:
         return self._pieces(quaternions, between)
 
     def _pieces(self, values: Array, between: Callable[[slice, Array], Array]) -> Array:
-        """`between` on each stretch of samples without an event; what an event changes at one time
-        is what it is behind it."""
+        """Apply `between` to each stretch of samples without an event.
+
+        At the time of an event the value after it is used.
+        """
         if len(self.t) == 1:
             return np.repeat(values[:1], len(self.times), axis=0)
         result = np.empty((len(self.times), *values.shape[1:]))
@@ -127,7 +129,7 @@ class FrameTimes:
         return result
 
     def way(self, run: Record, reference: str) -> Array:
-        """(n, 3) m, the way of a body's origin or an end, in steps of time finer than a film's."""
+        """Path (n, 3) in m of a body's origin or an end, in finer time steps than the frames."""
         trail_times = replace(self, times=np.linspace(self.times[0], self.times[-1], self._fine))
         points = run._observed.points(reference)[self.kept]
         return trail_times.smooth(points[:, 0:3], points[:, 3:6])
@@ -137,7 +139,7 @@ class FrameTimes:
         return _TRAIL_POINTS_PER_FRAME * (len(self.times) - 1) + 1
 
     def poses(self, run: Record, reference: str) -> Poses:
-        """The axes of a body or an end."""
+        """Poses of the axes of a body or an end."""
         points = run._observed.points(reference)[self.kept]
         position = self.smooth(points[:, 0:3], points[:, 3:6])
         orientation = quaternions(points[:, 15:24])
@@ -145,7 +147,7 @@ class FrameTimes:
 
 
 def natural_speed(lasts: float) -> float:
-    """1, or 1, 2 or 5 times a power of ten so that a film lasts some seconds."""
+    """Default speed: 1, or 1, 2 or 5 times a power of ten, for a film of some seconds."""
     if MIN_DURATION <= lasts <= MAX_DURATION:
         return 1.0
     target_speed = lasts / (4 * MIN_DURATION if lasts < MIN_DURATION else MAX_DURATION / 2)

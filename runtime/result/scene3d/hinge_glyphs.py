@@ -1,4 +1,4 @@
-"""Glyphs of hinges by what they leave free, coils of springs, feet on the ground."""
+"""Glyphs of hinges by their degrees of freedom, coils of springs, ground blocks."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ HINGE_COLOUR: Colour = (60, 66, 74)
 GROUND_COLOUR: Colour = (120, 126, 134)
 SPRING_COLOUR: Colour = (150, 110, 30)
 
-#: Turns of a coil, points in each, its radius by its greatest length.
+#: Turns of a coil, points in each, and its radius relative to its greatest length.
 _COIL_TURNS, _POINTS_PER_TURN, _RADIUS_TO_LENGTH = 8, 10, 0.08
 
 
 def hinge_glyph(hinge: Hinge, r: float) -> Surface | None:
-    """A hinge in the axes of its outboard end; None for one that leaves all free.  `r` in m.
+    """Glyph of a hinge in the axes of its outboard end; None for a free hinge. `r` in m.
 
-    Each axis about which it turns is a pin, each along which it slides a square rail; three
-    rotations are a ball, none of either a small block; what is none of these is a ball as well.
+    Each rotation axis is a pin, each sliding axis a square rail; three rotations are a ball, and a
+    hinge without either a small block; any other hinge is a ball as well.
     """
     facts = hinge.facts
     if facts is None:
@@ -63,7 +63,7 @@ def hinge_glyph(hinge: Hinge, r: float) -> Surface | None:
 
 
 def _hinge_motions(hinge: Hinge) -> list[tuple[Array, Array]]:
-    """(translation, rotation) of each speed at the start, axes of the outboard end."""
+    """Translation and rotation of each speed at the start, axes of the outboard end."""
     return [(np.array(t), np.array(w)) for t, w in initial_motion_axes(hinge) or ()]
 
 
@@ -83,12 +83,12 @@ def _crossing_axes(hinge: Hinge) -> list[Array]:
 
 
 def ground_block(at: Array, r: float) -> Solid:
-    """Where something is held by the ground; `at` (3,) in m."""
+    """Block of an attachment to the ground; `at` (3,) in m."""
     return Solid("ground", "", box_surface((2.6 * r, 2.6 * r, 2.6 * r)).placed(at), GROUND_COLOUR)
 
 
 def spring_coil(start: Array, end: Array, widest: float) -> Array:
-    """(f, n, 3) points of a coil between points (f, 3) that move; radius `widest` (m) at most."""
+    """Points (f, n, 3) of a coil between moving points (f, 3); radius at most `widest` (m)."""
     radius = min(_RADIUS_TO_LENGTH * float(np.linalg.norm(end - start, axis=1).max()), widest)
     s = np.linspace(0.0, 1.0, _COIL_TURNS * _POINTS_PER_TURN + 1)
     angle = 2 * np.pi * _COIL_TURNS * np.clip((s - 0.12) / 0.76, 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""A stage as one page: it moves, turns and answers without a network (extra: view)."""
+"""Self-contained interactive page of a scene, without network access (extra: view)."""
 
 from __future__ import annotations
 
@@ -21,19 +21,21 @@ from .camera import FIELD_OF_VIEW, choose_camera
 from .scene_graph import DeformingSurface, Line, Poses, SceneGraph, Solid
 from .solid_meshes import axes_along
 
-#: Places closer than this by the size of the scene, and quaternions closer than this, are the same.
+#: Positions closer than this, relative to the size of the scene, and quaternions closer than this,
+#: are equal.
 _POSE_TOLERANCE = 1e-5
-#: Where what is not chosen is, m, of what is drawn at 100 m at most.
+#: Position of unselected objects, m, of a scene drawn at 100 m at most.
 _HIDDEN_DISTANCE = 1e6
-#: Sizes (m) between which viser shows all of a scene, and the one that others are drawn at.
+#: Sizes (m) between which viser shows a whole scene, and the size to which others are scaled.
 _MIN_SIZE, _MAX_SIZE, _SCALED_SIZE = 0.5, 100.0, 10.0
-#: The grid: its width, and how far it lies below everything, by the size of the scene; its colours.
+#: Width of the grid and its distance below everything, relative to the size of the scene; its
+#: colours.
 _GRID_WIDTH, _GRID_DISTANCE = 1.3, 0.04
 _CELL_COLOUR, _SECTION_COLOUR = (186, 190, 196), (150, 154, 160)
 
 
 def render_page(stage: SceneGraph) -> str:
-    """The whole page.  EnvironmentFailure without the extra."""
+    """Page as text. EnvironmentFailure without the extra."""
     if not _MIN_SIZE < stage.size < _MAX_SIZE:
         stage = stage.scaled(_SCALED_SIZE / stage.size)
     with _start_server() as server:
@@ -56,14 +58,14 @@ def render_page(stage: SceneGraph) -> str:
 
 
 def _frame_pause(stage: SceneGraph) -> float:
-    """Seconds of film from one picture to the next."""
+    """Seconds of film from one frame to the next."""
     duration = float(stage.times[-1] - stage.times[0])
     return duration / stage.speed / (len(stage.times) - 1)
 
 
 @contextmanager
 def _start_server() -> Iterator[Any]:
-    """What records a scene: it listens on this machine alone, to nobody, for the moment."""
+    """Start the server that records a scene; it listens on this machine only, temporarily."""
     try:
         import viser
     except ImportError as error:
@@ -85,7 +87,7 @@ def _start_server() -> Iterator[Any]:
 
 @contextmanager
 def _silence_console() -> Iterator[None]:
-    """What viser says of its server is nobody's concern: not on a terminal, not in a notebook."""
+    """Suppress the console output of viser about its server, on a terminal and in a notebook."""
     import rich
 
     console = rich.get_console()
@@ -97,13 +99,13 @@ def _silence_console() -> Iterator[None]:
 
 
 class _AnimatedScene:
-    """The scene of a server, at one moment after another."""
+    """Scene of a server, advanced from one frame to the next."""
 
     def __init__(self, scene: Any, stage: SceneGraph) -> None:
         self.scene, self.stage = scene, stage
         self.same = _POSE_TOLERANCE * stage.size
         self.clock = scene.add_frame("/clock", show_axes=False)
-        for name in stage.choices:  # out of sight until its turn
+        for name in stage.choices:  # hidden until selected
             offset = (0.0 if name == stage.choices[0] else _HIDDEN_DISTANCE, 0.0, 0.0)
             scene.add_frame(f"/{name}", show_axes=False, position=offset)
         self.frames = {
@@ -137,7 +139,7 @@ class _AnimatedScene:
         )  # fmt: skip
 
     def to(self, k: int) -> None:
-        """Move what has moved to moment k."""
+        """Move the objects that moved to frame k."""
         self.clock.position = (float(k), 0.0, 0.0)
         for owner, pose in self.stage.poses.items():
             self._pose(owner, pose, min(k, len(pose.position) - 1))
@@ -163,12 +165,12 @@ class _AnimatedScene:
 
 
 def _line_segments(points: Array) -> Any:
-    """(n - 1, 2, 3) pieces of a broken line (n, 3)."""
+    """Segments (n - 1, 2, 3) of a polyline (n, 3)."""
     return np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
 
 
 def _add_grid(scene: Any, stage: SceneGraph) -> None:
-    """A grid normal to up, below everything."""
+    """Add a grid normal to up, below everything."""
     low, high = stage.corners()
     up, middle = stage.up, (low + high) / 2
     floor = float((stage.cloud @ up).min()) - _GRID_DISTANCE * stage.size
@@ -184,7 +186,7 @@ def _add_grid(scene: Any, stage: SceneGraph) -> None:
 
 
 def _insert_script(text: str, stage: SceneGraph) -> str:
-    """The page with its title, what it says of bodies and hinges, and the script that says it."""
+    """Page with its title, the labels of bodies and hinges, and the script that shows them."""
     page_data = json.dumps(_page_data(stage), separators=(",", ":")).replace("<", "\\u003c")
     script = files(__package__).joinpath("page.js").read_text(encoding="utf-8")
     head = text.index("</head>")
@@ -198,7 +200,7 @@ def _insert_script(text: str, stage: SceneGraph) -> str:
 
 
 def _page_data(stage: SceneGraph) -> dict[str, Any]:
-    """What the script knows: numbers as little-endian floats in base64."""
+    """Data of the script: numbers as little-endian floats in base64."""
     owners = {
         f"/{owner}": {
             "name": label.name, "text": label.text, "anchor": [float(x) for x in label.anchor],

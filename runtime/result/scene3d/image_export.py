@@ -1,4 +1,4 @@
-"""A stage as pictures: a strip of moments, numbered frames, GIF and MP4 (extra: plot)."""
+"""Images of a scene: a strip of frames, numbered frames, GIF and MP4 (extra: plot)."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from .page_selector import Part
 from .projection import ProjectedFrame
 from .scene_graph import SceneGraph
 
-#: Endings of strips and of films.
+#: Suffixes of strips and of films.
 STRIP_SUFFIXES, FILM_SUFFIXES = (".png", ".svg", ".pdf"), (".gif", ".mp4")
 
-#: Inches: width of a strip and of a frame, room for a line of text; dots per inch of frames.
+#: Inches: width of a strip and of a frame, height of a line of text; dots per inch of frames.
 _STRIP_WIDTH, _FRAME_WIDTH, _LINE_HEIGHT, _FRAME_DPI = 7.2, 6.4, 0.28, 100
-#: Most pictures a second of a GIF, which is large; moments in one row of a strip.
+#: Largest frame rate of a GIF, because GIF files are large; frames in one row of a strip.
 _MAX_GIF_RATE, _MAX_STRIP_COLUMNS = 15.0, 6
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One picture: a stage at a moment, and what stands above it."""
+    """Single image: a scene at a frame time, and its title."""
 
     flat: ProjectedFrame
     moment: int
@@ -38,7 +38,7 @@ class Frame:
 
 
 def film_frames(parts: Sequence[Part], whole: SceneGraph) -> list[Frame]:
-    """Every moment of every part, one part after the other, in the window of them all."""
+    """All frames of all parts, one part after the other, in their common window."""
     flats = [ProjectedFrame(part, whole) for _, part in parts]
     several = len(parts) > 1
     return [
@@ -53,7 +53,7 @@ def film_frames(parts: Sequence[Part], whole: SceneGraph) -> list[Frame]:
 
 
 def strip_frames(parts: Sequence[Part], whole: SceneGraph, count: int) -> list[Frame]:
-    """So many moments; of several parts the first moment of each."""
+    """Frames of a strip: `count` of one part; of several parts, the first of each."""
     if len(parts) > 1:
         return [Frame(ProjectedFrame(part, whole), 0, name) for name, part in parts]
     indices = np.unique(np.linspace(0, len(whole.times) - 1, max(1, count)).round().astype(int))
@@ -63,7 +63,7 @@ def strip_frames(parts: Sequence[Part], whole: SceneGraph, count: int) -> list[F
 
 
 def write_strip(shots: Sequence[Frame], file: Path | IO[bytes], kind: str, title: str = "") -> None:
-    """Pictures side by side, for papers; `kind` is png, svg or pdf."""
+    """Write images in a row for publications; `kind` is png, svg or pdf."""
     shape = shots[0].flat.shape
     columns = _column_count(len(shots), shape)
     rows = -(-len(shots) // columns)
@@ -87,16 +87,16 @@ def write_strip(shots: Sequence[Frame], file: Path | IO[bytes], kind: str, title
 
 
 def _column_count(count: int, shape: float) -> int:
-    """Moments in a row: about as many as make the strip wider than it is tall."""
+    """Frames in a row, chosen so that the strip is about wider than tall."""
     max_columns = (
         _MAX_STRIP_COLUMNS if shape > 0.8 else max(1, int(np.ceil(np.sqrt(count * shape * 2.2))))
     )
     rows = -(-count // min(count, max_columns))
-    return -(-count // rows)  # rows alike, so that the last one has no hole
+    return -(-count // rows)  # rows of equal length, so that the last one has no gap
 
 
 def write_film(shots: Sequence[Frame], path: Path) -> None:
-    """A GIF or an MP4, by the ending.  EnvironmentFailure where an MP4 lacks ffmpeg."""
+    """Write a GIF or an MP4 by suffix. EnvironmentFailure if an MP4 lacks ffmpeg."""
     stage = shots[0].flat.stage
     figure, axis = _frame_figure(shots[0].flat)
     from matplotlib import animation, rc_context
@@ -117,12 +117,12 @@ def write_film(shots: Sequence[Frame], path: Path) -> None:
                 writer.grab_frame(facecolor="white")
 
 
-#: Every player takes this kind of colours; sizes must be even.
+#: Pixel format that every player supports; sizes must be even.
 _FFMPEG_ARGUMENTS = ["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]
 
 
 def write_frames(shots: Sequence[Frame], folder: Path) -> Sequence[Path]:
-    """Every picture as frame_0001.png and so on; MstmmError where the folder cannot be made."""
+    """Write all frames as frame_0001.png etc.; MstmmError if the folder cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -173,7 +173,7 @@ def _new_figure(wide: float, tall: float) -> Any:
 
 
 def _ffmpeg_path() -> str:
-    """The program that writes an MP4: ffmpeg, or the one that imageio-ffmpeg brings."""
+    """Path of the program that writes MP4: ffmpeg, or that of imageio-ffmpeg."""
     executable = shutil.which("ffmpeg")
     if executable is None:
         try:

@@ -1,4 +1,4 @@
-"""What acts on the bodies, as arrows: loads and gravity."""
+"""Arrows of the loads on bodies and of gravity."""
 
 from __future__ import annotations
 
@@ -24,18 +24,21 @@ if TYPE_CHECKING:
 
 _LOAD_COLOUR: Colour = (205, 55, 50)
 _GRAVITY_COLOUR: Colour = (85, 105, 130)
-#: Length of the largest force, radius of the largest moment, thickness of their arrows, by the size
-#: of the scene; the same of gravity's arrow, and how far it is from the scene.
+#: Length of the largest force, radius of the largest moment, thickness of their arrows, relative to
+#: the size of the scene; the same for gravity's arrow, and its distance from the scene.
 _FORCE_LENGTH, _MOMENT_RADIUS, _SHAFT_RADIUS = 0.16, 0.08, 0.005
 _GRAVITY_LENGTH, _GRAVITY_RADIUS, _GRAVITY_DISTANCE = 0.1, 0.0035, 0.05
-#: Arrows of a load per length, and how long they are beside one of the same force.
+#: Arrows of a load per length, and their length relative to one of the same force.
 _ARROWS_PER_LINE_LOAD, _LINE_LOAD_SCALE = 7, 0.5
 
 
 @dataclass(frozen=True)
 class _LoadHistory:
-    """A load over the moments: force (f, 3) N and moment (f, 3) N*m, where it acts (f, 3) m, all
-    places if there are several, and the axes of its end."""
+    """Load at the frame times.
+
+    Force (f, 3) N and moment (f, 3) N*m, points of action (f, 3) m, several for a load per length,
+    and the axes of its end.
+    """
 
     load: Load
     force: Array
@@ -45,7 +48,7 @@ class _LoadHistory:
 
 
 class LoadArrows:
-    """The loads of a run, over the moments of a film; `size` (m) is that of the scene."""
+    """Loads of a run at the frame times of a film; `size` (m) is that of the scene."""
 
     def __init__(self, run: Record, when: FrameTimes, size: float) -> None:
         self.run, self.when, self.size = run, when, size
@@ -84,7 +87,7 @@ class LoadArrows:
         )
 
     def bent(self) -> Iterator[DeformingSurface]:
-        """Arrows of forces and moments, those of a kind to one scale."""
+        """Arrows of forces and moments, all of one kind to one scale."""
         max_force = max((_max_norm(history.force) for history in self.seen), default=0.0)
         max_moment = max((_max_norm(history.moment) for history in self.seen), default=0.0)
         shaft_radius = _SHAFT_RADIUS * self.size
@@ -106,12 +109,12 @@ class LoadArrows:
                 yield _joined_arrows(f"moments/{history.load.name}", arrow_meshes)
 
     def poses(self) -> Iterator[tuple[str, Poses]]:
-        """Owners of what the page says of loads."""
+        """Owners of the labels of loads on the page, with their poses."""
         for history in self.seen:
             yield f"loads/{history.load.name}", history.pose
 
     def told(self) -> Iterator[tuple[str, ObjectLabel]]:
-        """What the page says of them."""
+        """Labels of loads on the page."""
         for history in self.seen:
             numbers = [(f"force {x}", "N", v) for x, v in zip("xyz", history.force.T, strict=True)]
             numbers += [
@@ -140,7 +143,7 @@ def _joined_arrows(name: str, drawn: list[tuple[Array, Faces]]) -> DeformingSurf
 
 
 def gravity_arrow(stage: SceneGraph, strength: float) -> tuple[Solid, ObjectLabel] | None:
-    """An arrow beside everything that is drawn, down; None without gravity (m/s2)."""
+    """Downward arrow next to everything that is drawn; None without gravity (m/s2)."""
     if not strength > 0:
         return None
     low, high = stage.corners()

@@ -1,4 +1,4 @@
-"""Several stages on one page, of which one is looked at at a time: modes, rows of a batch."""
+"""Several scenes on one page, shown one at a time: modes, rows of a batch."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def combine_stages(title: str, parts: Sequence[Part]) -> SceneGraph:
-    """Stages over the same moments as one; what belongs to each carries its name in front."""
+    """Combine scenes over the same frame times; names of objects are prefixed by their part."""
     first = parts[0][1]
     notes = dict.fromkeys(note for _, stage in parts for note in stage.notes)
     return replace(

@@ -1,5 +1,4 @@
-"""Projection of a stage at one time: triangles sorted by depth, with lines over them
-(extra: plot)."""
+"""Projection of a scene at one time: triangles by depth, with lines over them (extra: plot)."""
 
 from __future__ import annotations
 
@@ -15,15 +14,17 @@ from .camera import Camera, choose_camera
 from .scene_graph import SceneGraph
 from .solid_meshes import Colour, Faces
 
-#: Where light comes from: to the right, up and towards the camera; and how much is everywhere.
+#: Direction to the light: right, up and towards the camera; and the ambient light.
 _LIGHT_DIRECTION, _AMBIENT_LIGHT = np.array([0.3, 0.75, 0.6]), 0.45
 _PAPER, _FAINT = "#ffffff", "#d9dde2"
 
 
 @dataclass(frozen=True)
 class ProjectedFrame:
-    """A stage seen by its camera from far away: no perspective, so that lengths can be compared.
-    The camera and the window are those of `whole`, where the stage is a part of that."""
+    """Parallel projection of a scene, so that lengths can be compared.
+
+    The camera and the window are those of `whole`, of which the scene may be a part.
+    """
 
     stage: SceneGraph
     whole: SceneGraph | None = None
@@ -34,7 +35,7 @@ class ProjectedFrame:
 
     @cached_property
     def window(self) -> tuple[Array, Array]:
-        """Least and largest (right, up) in m that the picture shows in every moment."""
+        """Least and largest (right, up) in m shown in all frames."""
         plane_points = ((self.whole or self.stage).cloud @ self.camera.axes.T)[:, :2]
         low, high = plane_points.min(axis=0), plane_points.max(axis=0)
         margin = 0.04 * max(float((high - low).max()), 1e-9)
@@ -42,13 +43,13 @@ class ProjectedFrame:
 
     @property
     def shape(self) -> float:
-        """Height of the window by its width, within what a page can hold."""
+        """Height of the window by its width, limited to the size of a page."""
         low, high = self.window
         width, height = high - low
         return float(np.clip(height / width, 0.2, 4.0))
 
     def draw(self, axis: Any, k: int) -> None:
-        """Moment k into matplotlib axes."""
+        """Draw frame k into matplotlib axes."""
         from matplotlib.collections import LineCollection, PolyCollection
 
         corners, colours = self._triangles(k)
@@ -69,8 +70,10 @@ class ProjectedFrame:
         axis.set_axis_off()
 
     def _triangles(self, k: int) -> tuple[Array, Array]:
-        """Corners (n, 3, 2) of the triangles that face the camera, far ones first, and their
-        colours (n, 4)."""
+        """Corners (n, 3, 2) and colours (n, 4) of visible triangles, farthest first.
+
+        Visible are the triangles that face the camera.
+        """
         parts = [self._facing(*part) for part in self._surfaces(k)]
         corners = np.concatenate([part[0] for part in parts]) if parts else np.zeros((0, 3, 3))
         colours = np.concatenate([part[1] for part in parts]) if parts else np.zeros((0, 4))
@@ -78,7 +81,7 @@ class ProjectedFrame:
         return corners[order][:, :, :2], colours[order]
 
     def _surfaces(self, k: int) -> Any:
-        """(inertial vertices, faces, colour, opacity) of everything at moment k."""
+        """Inertial vertices, faces, colour and opacity of everything in frame k."""
         rotations = {owner: pose.at(k) for owner, pose in self.stage.poses.items()}
         for solid in self.stage.solids:
             if not solid.hidden:

@@ -1,4 +1,4 @@
-"""A run put on a stage: every body, hinge, spring and trail of it, over the moments of a film."""
+"""Builder of the scene graph of a run: bodies, hinges, springs and trails over the frames."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from .solid_meshes import Colour, ellipsoid_surface
 if TYPE_CHECKING:
     from ..result_record import Record
 
-#: Colours of bodies, one after another: apart for the colour-blind too, on white and on black.
+#: Colours of bodies in order, distinguishable for colour-blind readers on white and on black.
 _BODY_COLOURS: tuple[Colour, ...] = (
     (68, 119, 170), (204, 119, 68), (68, 150, 90), (170, 90, 150), (190, 170, 60), (90, 180, 190),
     (190, 80, 90), (120, 130, 140),
 )  # fmt: skip
 _TRAIL_COLOUR: Colour = (150, 160, 175)
 
-#: Hinges of a scene of more are not drawn.
+#: Hinges are not drawn in scenes with more of them.
 _MAX_HINGES = 300
-#: Radius of a hinge's glyph, and of a foot, by that of the bars that it joins.
+#: Radius of a hinge's glyph, and of a ground block, relative to that of the bars that it joins.
 _GLYPH_RADIUS_RATIO, _FOOT_RADIUS_RATIO = 1.6, 1.2
-#: Samples by which the size of the scene is taken.
+#: Largest number of samples for the size of the scene.
 _MAX_SIZE_SAMPLES = 40
 
 
@@ -46,9 +46,12 @@ def build_scene_graph(
     most: int | None = None,
     when: FrameTimes | None = None,
 ) -> SceneGraph:
-    """The stage of a run.  `trails`: ends whose ways are drawn; `speed`: seconds of the run per
-    second of film; `most`: pictures at most; `when`: moments of one's own in place of these.
-    SceneError for an end that there is not, and for a run without samples."""
+    """Scene graph of a run.
+
+    `trails`: ends whose paths are drawn; `speed`: seconds of the run per second of film; `most`:
+    largest number of frames; `when`: given frame times instead of these. SceneError for an unknown
+    end, and for a run without samples.
+    """
     return _SceneBuilder(run, trails, speed, most, when).stage(title)
 
 
@@ -93,10 +96,10 @@ class _SceneBuilder:
             told={**scene_graph.told, arrow.owner: told},
         )
 
-    # --- what is there ----------------------------------------------------------------------------
+    # --- geometry ---------------------------------------------------------------------------------
 
     def _size(self) -> float:
-        """The diagonal (m) of the box that holds origins and ends of all bodies."""
+        """Diagonal (m) of the box that contains origins and ends of all bodies."""
         frames = np.unique(np.linspace(0, len(self.when.times) - 1, _MAX_SIZE_SAMPLES).astype(int))
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         for name, body in zip(self.names, self.skeleton.bodies, strict=True):
@@ -137,7 +140,7 @@ class _SceneBuilder:
                 )
 
     def _shapes(self) -> Iterator[Solid]:
-        """Every shape of the scene: such a body is drawn by its shapes alone."""
+        """Solids of the shapes of the scene: bodies with shapes are drawn by these only."""
         saved_files = self.run.meshes
         for shape in self.scene.shape:
             if shape.is_on_ground:
@@ -181,7 +184,7 @@ class _SceneBuilder:
             )
 
     def _axes_of(self, hinge: Hinge) -> Poses:
-        """Where a glyph is: with the outboard end; the rail of what slides alone stays behind."""
+        """Poses of a glyph: at the outboard end; a sliding hinge's rail at the inboard end."""
         outer = self.when.poses(self.run, hinge.outboard)
         if hinge.facts is None or hinge.facts.turns or not hinge.facts.slides:
             return outer
@@ -192,7 +195,7 @@ class _SceneBuilder:
         return Poses(start, outer.quaternion)
 
     def _held(self) -> Iterator[Hinge]:
-        """Hinges that hold something to the ground."""
+        """Hinges that attach a body to the ground."""
         for hinge in self.hinges:
             free = hinge.facts is not None and hinge.facts.free_body
             if hinge.inboard_body == GROUND and not free:
@@ -222,12 +225,12 @@ class _SceneBuilder:
             yield Line(f"springs/{spring.name}", points, hinge_glyphs.SPRING_COLOUR)
 
     def _ways_of(self, name: str) -> list[Array]:
-        """(f, 3) where the ends of an elastic body are, each over the moments."""
+        """Paths (f, 3) of the ends of an elastic body, one array for each end."""
         ends = self.elastic[name].ends
         return [self.when.poses(self.run, f"{name}.{end}").position for end in ends]
 
     def _place(self, spring: Spring, reference: str) -> Array:
-        """(f, 3) where an end of a spring is."""
+        """Path (f, 3) of an end of a spring."""
         if split_reference(reference)[0] == GROUND:
             return np.tile(np.array(spring.position), (len(self.when.times), 1))
         return self.when.poses(self.run, reference).position
@@ -240,13 +243,13 @@ class _SceneBuilder:
             yield Line(f"trails/{reference}", way[None], _TRAIL_COLOUR, 2.0)
 
     def _centre(self, name: str, body: Body) -> Array:
-        """Where a body is pointed at, in its axes."""
+        """Label position of a body, in its axes."""
         flexible_body = self.run.model.flexible.get(name)
         if flexible_body is None or not flexible_body.ports:
             return body_geometry.body_centre(body)
         return np.mean([port.position for port in flexible_body.ports.values()], axis=0)
 
-    # --- what the page says -----------------------------------------------------------------------
+    # --- labels of the page -----------------------------------------------------------------------
 
     def _told(self) -> Iterator[tuple[str, ObjectLabel]]:
         for name, body in zip(self.names, self.skeleton.bodies, strict=True):

@@ -1,4 +1,4 @@
-"""Everything that is seen of a run: solids on bodies that move, what bends, lines, and when."""
+"""Scene graph of a run: solids on moving bodies, deforming surfaces, lines, frame times."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .solid_meshes import Colour, Faces, Surface
 
 @dataclass(frozen=True)
 class Poses:
-    """Axes over f moments: position (f, 3) in m, quaternion (f, 4) w, x, y, z to inertial axes."""
+    """Poses over f frames: position (f, 3) in m, quaternion (f, 4) w, x, y, z to inertial axes."""
 
     position: Array
     quaternion: Array
 
     def rotation(self) -> Array:
-        """(f, 3, 3) axes of the owner to inertial axes."""
+        """Rotation matrices (f, 3, 3) from axes of the owner to inertial axes."""
         w, x, y, z = self.quaternion.T
         rows = [
             1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
@@ -31,18 +31,18 @@ class Poses:
         return np.stack(rows, axis=1).reshape(-1, 3, 3)
 
     def at(self, k: int) -> tuple[Array, Array]:
-        """Position (3,) and axes (3, 3) at moment k."""
+        """Position (3,) and axes (3, 3) at frame k."""
         pose = Poses(self.position[k : k + 1], self.quaternion[k : k + 1])
         return self.position[k], pose.rotation()[0]
 
     def of(self, points: Array) -> Array:
-        """(f, n, 3) inertial places of points (n, 3) that move with the axes."""
+        """Inertial positions (f, n, 3) of points (n, 3) fixed in the axes."""
         return self.position[:, None] + np.einsum("fij,nj->fni", self.rotation(), points)
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A surface that moves with the axes of `owner`: "bodies/rod1", "hinges/elbow", "ground"."""
+    """Surface fixed in the axes of `owner`: "bodies/rod1", "hinges/elbow", "ground"."""
 
     owner: str
     part: str
@@ -54,7 +54,7 @@ class Solid:
 
 @dataclass(frozen=True)
 class DeformingSurface:
-    """A surface whose vertices (f, n, 3) move by themselves; inertial axes."""
+    """Surface with moving vertices (f, n, 3); inertial axes."""
 
     name: str
     vertices: Array
@@ -64,8 +64,11 @@ class DeformingSurface:
 
 @dataclass(frozen=True)
 class Line:
-    """A broken line over the moments, (f, n, 3); inertial axes.  A trail, (1, n, 3), is the way of
-    a point from the first moment to the last, its places evenly spread in time."""
+    """Polyline over the frames, (f, n, 3); inertial axes.
+
+    A trail, (1, n, 3), is the path of a point from the first frame to the last, with points evenly
+    spaced in time.
+    """
 
     name: str
     points: Array
@@ -73,7 +76,7 @@ class Line:
     width: float = 1.5
 
     def at(self, k: int, moments: int) -> Array:
-        """(m, 3) the line at moment k; of a trail, what has been gone by then."""
+        """Line (m, 3) at frame k; of a trail, the part covered by then."""
         if len(self.points) > 1 or moments < 2:
             return self.points[min(k, len(self.points) - 1)]
         shown_count = (self.points.shape[1] - 1) * k // (moments - 1)
@@ -82,7 +85,7 @@ class Line:
 
 @dataclass(frozen=True)
 class ObjectLabel:
-    """What the page says of an owner: lines of text, and numbers (f, k) with labels and units."""
+    """Label of an owner on the page: lines of text, and numbers (f, k) with labels and units."""
 
     name: str
     text: tuple[str, ...]
@@ -93,17 +96,17 @@ class ObjectLabel:
 
 @dataclass(frozen=True)
 class SceneGraph:
-    """What is seen, over moments `times` (f,) in s.
+    """Drawn objects over the frame times `times` (f,) in s.
 
     Attributes:
-        title: what the page is called.
+        title: title of the page.
         speed: seconds of the run per second of a film.
         up: (3,) unit vector that points up in the picture.
-        poses: owner -> its axes over the moments; "ground" has none.
-        told: owner -> what the page says of it.
-        notes: what a reader should know of the drawing.
-        clock: what the moments are, and their unit.
-        choices: names in front of owners, of which one is looked at at a time; none: all are.
+        poses: owner -> its axes over the frames; "ground" has none.
+        told: owner -> its label on the page.
+        notes: notes on the drawing for readers.
+        clock: what the frame times are, and their unit.
+        choices: prefixes of owners, of which one is shown at a time; if empty, all are.
     """
 
     title: str
@@ -120,7 +123,7 @@ class SceneGraph:
     choices: tuple[str, ...] = ()
 
     def scaled(self, factor: float) -> SceneGraph:
-        """The same so many times as large; what is told stays what it is."""
+        """Scene graph scaled by a factor; the values of labels are unchanged."""
         scaled_poses = {owner: replace(pose, position=factor * pose.position)
                  for owner, pose in self.poses.items()}  # fmt: skip
         solids = tuple(replace(item, surface=item.surface.scaled(factor)) for item in self.solids)
@@ -133,7 +136,7 @@ class SceneGraph:
 
     @cached_property
     def cloud(self) -> Array:
-        """Inertial places (n, 3) that hold all that is drawn between them, over all moments."""
+        """Inertial points (n, 3) that enclose everything that is drawn, over all frames."""
         clouds = [_sampled_points(line.points) for line in self.lines]
         clouds += [_sampled_points(bent.vertices) for bent in self.bent]
         for solid in self.solids:
@@ -148,30 +151,30 @@ class SceneGraph:
         return corners if pose is None else _sampled_points(pose.of(corners))
 
     def corners(self) -> tuple[Array, Array]:
-        """Least and largest inertial coordinates (3,) of all that is drawn, in all moments."""
+        """Least and largest inertial coordinates (3,) of everything drawn, in all frames."""
         return self.cloud.min(axis=0), self.cloud.max(axis=0)
 
     @property
     def digits(self) -> int:
-        """Decimals by which its moments are told apart, in s."""
+        """Number of decimals that distinguishes its frame times, in s."""
         duration = float(self.times[-1] - self.times[0]) or 1.0
         return int(np.clip(3 - np.floor(np.log10(duration)), 0, 12))
 
     @cached_property
     def size(self) -> float:
-        """The diagonal (m) of the box that holds everything; 1 of a scene that is a point."""
+        """Diagonal (m) of the box that contains everything; 1 for a scene that is a point."""
         low, high = self.corners()
         return float(np.linalg.norm(high - low)) or 1.0
 
 
-#: Corners of a box of edges 1.
+#: Corners of a unit box.
 _UNIT_BOX_CORNERS = np.array(
     [[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
 )
-#: Moments that are looked at to find how large everything is.
+#: Largest number of frames examined for the size of the scene.
 _MAX_SIZE_SAMPLES = 60
 
 
 def _sampled_points(points: Array) -> Array:
-    """Points (f, n, 3) at some of the moments, as (m, 3)."""
+    """Points (f, n, 3) at some of the frames, as (m, 3)."""
     return points[:: max(1, len(points) // _MAX_SIZE_SAMPLES)].reshape(-1, 3)

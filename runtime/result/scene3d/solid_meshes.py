@@ -1,4 +1,4 @@
-"""Solids as triangles: what a body, a hinge or the ground looks like, in the axes of its owner."""
+"""Triangle meshes of bodies, hinges and the ground, in the axes of their owner."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.array_validation import Array
 
-#: Corners of round things, once around.
+#: Corners around round solids.
 CORNERS_AROUND = 20
 
 Colour = tuple[int, int, int]
@@ -19,18 +19,20 @@ Faces = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles: vertices (n, 3) in m, faces (m, 3) by number of vertex, seen from outside
-    anticlockwise."""
+    """Triangle mesh: vertices (n, 3) in m, faces (m, 3) by vertex index.
+
+    Faces are anticlockwise as seen from outside.
+    """
 
     vertices: Array
     faces: Faces
 
     def scaled(self, factor: float) -> Surface:
-        """So many times as large, about the origin of its axes."""
+        """Surface scaled about the origin of its axes."""
         return replace(self, vertices=factor * self.vertices)
 
     def placed(self, at: ArrayLike = (0.0, 0.0, 0.0), axes: ArrayLike | None = None) -> Surface:
-        """Turned by `axes` (3, 3) and moved by `at` (3,)."""
+        """Surface rotated by `axes` (3, 3) and moved by `at` (3,)."""
         rotated = self.vertices if axes is None else self.vertices @ np.asarray(axes).T
         return replace(self, vertices=rotated + np.asarray(at))
 
@@ -44,22 +46,22 @@ def join_surfaces(parts: Sequence[Surface]) -> Surface:
 
 
 def box_surface(size: ArrayLike) -> Surface:
-    """A box about the origin with these three edges."""
+    """Box about the origin with these three edge lengths."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    vertices = corners[[k for quad in quads for k in quad]]  # each edge twice: it stays sharp
+    vertices = corners[[k for quad in quads for k in quad]]  # shared by no two faces: sharp
     first = 4 * np.arange(6)[:, None]
     faces = np.concatenate([first + np.array(corner) for corner in ((0, 1, 2), (0, 2, 3))])
     return Surface(vertices * np.asarray(size, dtype=np.float64), faces)
 
 
 def revolved_surface(profile: ArrayLike, around: int = CORNERS_AROUND) -> Surface:
-    """The surface that a line of (radius, z) sweeps about z, from the bottom to the top.
+    """Surface of revolution of a line of (radius, z) about z, from the bottom to the top.
 
-    Where its ends do not lie on the axis, discs close them.
+    Ends that are off the axis are closed by discs.
     """
     line = [(float(r), float(z)) for r, z in np.asarray(profile)]
-    if line[0][0] > 0:  # the rim twice: it stays sharp
+    if line[0][0] > 0:  # separate vertices on the rim keep it sharp
         line[:0] = [(0.0, line[0][1]), line[0]]
     if line[-1][0] > 0:
         line += [line[-1], (0.0, line[-1][1])]
@@ -70,7 +72,7 @@ def revolved_surface(profile: ArrayLike, around: int = CORNERS_AROUND) -> Surfac
 
 
 def tube_faces(rings: int, around: int) -> Faces:
-    """Faces between rings of vertices, each ring turning anticlockwise about the way ahead."""
+    """Faces between rings of vertices, each ring anticlockwise about the forward direction."""
     k, j = np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij")
     a, b = k * around + j, k * around + (j + 1) % around
     c, d = a + around, b + around
@@ -79,26 +81,26 @@ def tube_faces(rings: int, around: int) -> Faces:
 
 
 def cylinder_surface(radius: float, length: float, around: int = CORNERS_AROUND) -> Surface:
-    """A cylinder about z with its middle in the origin."""
+    """Cylinder about z, centred at the origin."""
     return revolved_surface([(radius, -length / 2), (radius, length / 2)], around)
 
 
 def capsule_surface(radius: float, length: float, around: int = CORNERS_AROUND) -> Surface:
-    """A cylinder of this length about z with half a sphere on each end."""
+    """Cylinder of this length about z with a hemisphere on each end."""
     angles = np.linspace(0.0, np.pi / 2, around // 4 + 1)
     cap = np.stack([radius * np.cos(angles), radius * np.sin(angles) + length / 2], axis=1)
     return revolved_surface(np.concatenate([cap[::-1] * (1, -1), cap]), around)
 
 
 def ellipsoid_surface(axes: ArrayLike, around: int = CORNERS_AROUND) -> Surface:
-    """An ellipsoid about the origin with these three half axes."""
+    """Ellipsoid about the origin with these three semi-axes."""
     angles = np.linspace(-np.pi / 2, np.pi / 2, around // 2 + 1)
     ball = revolved_surface(np.stack([np.cos(angles), np.sin(angles)], axis=1), around)
     return replace(ball, vertices=ball.vertices * np.asarray(axes, dtype=np.float64))
 
 
 def bar_surface(start: ArrayLike, end: ArrayLike, radius: float, around: int = 10) -> Surface:
-    """A round bar from one point to another."""
+    """Round bar from one point to another."""
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     return cylinder_surface(radius, float(np.linalg.norm(b - a)), around).placed(
         (a + b) / 2, axes_along(b - a)
@@ -106,7 +108,7 @@ def bar_surface(start: ArrayLike, end: ArrayLike, radius: float, around: int = 1
 
 
 def axes_along(direction: ArrayLike) -> Array:
-    """(3, 3) rotation of z to a direction."""
+    """Rotation (3, 3) of z to a direction."""
     z = np.asarray(direction, dtype=np.float64)
     z = z / np.linalg.norm(z)
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)

@@ -1,4 +1,4 @@
-"""The shapes that a scene gives to its bodies, its ends and the ground."""
+"""Geometry of the shapes that a scene gives to its bodies, its ends and the ground."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from .solid_meshes import (
     ellipsoid_surface,
 )
 
-#: Corners once around a shape, and triangles of a mesh at most.
+#: Corners around a shape, and largest number of triangles of a mesh.
 _CORNERS_AROUND, _MAX_TRIANGLES = 32, 200_000
 
 
 def shape_solid(
     shape: Shape, at: Vector, axes: Matrix, colour: Colour, kept: Mapping[str, bytes]
 ) -> Solid:
-    """A shape on an end that is at `at` (m) with `axes` (end to body) in the axes of its body.
+    """Solid of a shape on an end at `at` (m) with `axes` (end to body), in the axes of its body.
 
-    `kept`: contents of mesh files that came with the run, by path; others are read now.
+    `kept`: contents of mesh files stored with the run, by path; others are read now.
     """
     local_surface = _shape_surface(shape, kept).placed(shape.position, np.array(shape.rotation))
     owner = "ground" if shape.is_on_ground else f"bodies/{shape.owner}"
@@ -54,9 +54,9 @@ def _shape_surface(shape: Shape, kept: Mapping[str, bytes]) -> Surface:
 
 
 def _read_mesh(shape: Shape, content: bytes | None) -> Surface:
-    """The triangles of a file, or of what is known of its content.
+    """Read the triangles of a file, or of its stored content.
 
-    SceneError for a file that is none, EnvironmentFailure without the extra that reads it.
+    SceneError for an invalid file, EnvironmentFailure without the extra that reads it.
     """
     try:
         import trimesh
@@ -69,7 +69,7 @@ def _read_mesh(shape: Shape, content: bytes | None) -> Surface:
         file = BytesIO(path.read_bytes() if content is None else content)
         mesh = trimesh.load_mesh(file, file_type=path.suffix[1:].lower(), process=False)
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
-    except Exception as error:  # whatever its readers make of a file that is none
+    except Exception as error:  # readers raise many types for invalid files
         raise SceneError(
             f'shape "{shape.name}": file "{path}" is no mesh that can be read '
             f"({type(error).__name__}: {error})"

@@ -33,18 +33,18 @@ from .scene_builder import build_scene_graph
 if TYPE_CHECKING:
     from ..result_record import Record
 
-#: Endings of the files that a view can be.
+#: File suffixes of views.
 VIEW_SUFFIXES = (".html", *STRIP_SUFFIXES, *FILM_SUFFIXES)
 #: Height of a page in a notebook.
 _NOTEBOOK_HEIGHT = "480px"
 
 
 class SceneView(NotebookDisplay):
-    """View of a run.  Notebooks display it; `save` writes it.
+    """View of a run. Notebooks display it; `save` writes it.
 
     Attributes:
-        stage: everything that is seen, as triangles and poses over time.
-        parts: (name, stage) of what can be chosen, or of the one that there is.
+        stage: the scene graph as triangles and poses over time.
+        parts: (name, stage) of the selectable parts, or of the only one.
     """
 
     def __init__(self, title: str, parts: Sequence[Part]) -> None:
@@ -53,19 +53,19 @@ class SceneView(NotebookDisplay):
 
     @cached_property
     def html(self) -> str:
-        """One page that needs no network (extra: view)."""
+        """Self-contained page that needs no network (extra: view)."""
         return render_page(self.stage)
 
     def save(self, path: str | Path, moments: int = 6, title: bool = False) -> Path:
-        """Write a page (.html, extra: view), a strip of so many `moments` (.png, .svg, .pdf), with
-        its title above where that is asked for, a film (.gif, .mp4) or, into a folder, every frame
-        (extra: plot); returns the path.
+        """Write a view in the format given by the suffix; returns the path.
 
-        Where there is something to choose a strip has the first moment of each, and films show one
-        after the other.
+        A page (.html, extra: view), a strip of `moments` frames (.png, .svg, .pdf), with its title
+        above if `title` is true, a film (.gif, .mp4) or, into a folder, every frame (extra: plot).
 
-        A file appears under its name when it is whole.  SceneError for another ending,
-        EnvironmentFailure for what is not installed or cannot be written.
+        With several parts, a strip has the first frame of each, and films show one after the other.
+
+        A file appears under its name when it is complete. SceneError for another suffix,
+        EnvironmentFailure for missing extras and files that cannot be written.
         """
         path = require_path("view", path)
         moments = integer("moments", moments, 1, "a whole number, 1 or more")
@@ -88,14 +88,14 @@ class SceneView(NotebookDisplay):
             part.write_text(self.html, encoding="utf-8")
         elif ending in STRIP_SUFFIXES:
             write_strip(strip_frames(self.parts, self.stage, moments), part, ending[1:], title)
-        else:  # writers of films go by the ending
+        else:  # writers of films depend on the suffix
             with TemporaryDirectory() as folder:
                 film_path = Path(folder) / f"film{ending}"
                 write_film(film_frames(self.parts, self.stage), film_path)
                 shutil.copyfile(film_path, part)
 
     def picture(self, moments: int = 6) -> bytes:
-        """The same strip as a PNG in memory, which stays small where there is much to draw."""
+        """Strip as a PNG in memory, which stays small for complex scenes."""
         buffer = BytesIO()
         write_strip(strip_frames(self.parts, self.stage, moments), buffer, "png")
         return buffer.getvalue()
@@ -117,7 +117,7 @@ def make_view(
     trails: Sequence[str],
     speed: float | None,
 ) -> SceneView:
-    """See `Result.view`."""
+    """Create the view of a run; see `Result.view`."""
     trails = require_texts("trails", trails, "rod2.tip")
     title = optional_text("title", title) or ""
     return SceneView(title, [(title, build_scene_graph(run, title, trails, speed))])

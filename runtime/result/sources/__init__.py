@@ -1,1 +1,1 @@
-"""Quantities of what a scene is made of: hinges, springs, bushings, loads, what closes loops."""
+"""Quantities of the elements of a scene: hinges, springs, bushings, loads, loop constraints."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _IDENTITY_AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
-#: Numbers of the motion of all loads together, about 130 MB.
+#: Largest number of values of the motion of all loads together, about 130 MB.
 MAX_MOTION_NUMBERS = 2**24
 
 
@@ -34,7 +34,7 @@ class AppliedLoads:
 
     @cached_property
     def given(self) -> dict[str, Array]:
-        """What every expression reads: t, q, u and the inputs, those that are held from memory."""
+        """Values that expressions read: t, q, u and the inputs, held ones from memory."""
         run, held = self.observed.run, self.system.held
         inputs = np.array([self.system.inputs_at(t) for t in run.t.tolist()])
         inputs = inputs.reshape(len(run.t), NUMBERS_PER_PIECE * len(self.system.inputs))
@@ -52,14 +52,16 @@ class AppliedLoads:
 
     @cached_property
     def _loads(self) -> Array | None:
-        """(n, 2 loads, 24): of each load the motion of its point, and of its axes; None where this
-        would be too large."""
+        """Motion (n, 2 loads, 24) of the point and of the axes of each load.
+
+        None if the array would be too large.
+        """
         probes = [probe for number in range(len(self.system.loads)) for probe in self._pair(number)]
         is_small = len(self.observed.run.t) * 24 * len(probes) <= MAX_MOTION_NUMBERS
         return self._seen(probes) if is_small else None
 
     def load(self, number: int) -> tuple[Array, Array]:
-        """(n, 24) twice: motion of the point of a load and of its axes, see `Observation`."""
+        """Motion (n, 24) of the point of a load and of its axes, see `Observation`."""
         motions, first = self._loads, 2 * number
         if motions is None:
             motions, first = self._seen(self._pair(number)), 0
@@ -77,7 +79,7 @@ class AppliedLoads:
         return engine.observe(run.t, run.q, run.u, run.memory, probes, ("points",)).points
 
     def at(self, places: tuple[int, ...]) -> Array:
-        """(n, places): the values at some places, 0 at place -1."""
+        """Values (n, places) at some indices, 0 at index -1."""
         result = np.zeros((len(self.observed.run.t), len(places)))
         for k, slot in enumerate(places):
             if slot >= 0:

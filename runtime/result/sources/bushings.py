@@ -1,4 +1,4 @@
-"""Bushings over a run: their loads, and how far they are deflected."""
+"""Loads and deflections of bushings over a run."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ BUSHING_QUANTITIES = {
     "turn": QuantityKind("rad", "rotation vector of the end `to` from rest, own axes", XYZ, ()),
 }
 
-#: One that pulls as far as it is deflected: its load tells the deflection.
+#: With unit stiffness, the load equals the deflection.
 _UNIT_STIFFNESS = (*upper_triangle((1.0,) * 6), *upper_triangle((0.0,) * 6), *(0.0,) * 6)
 
 
@@ -44,24 +44,24 @@ def _wrench_kernel(element: str) -> KernelIR:
 
 
 def bushing_load(observed: Observations, bushing: Bushing) -> Array:
-    """(n, 6): force and moment on the end `to`, inertial axes."""
+    """Force and moment (n, 6) on the end `to`, inertial axes."""
     return _wrench_of_ends(_end_motions(observed, bushing), bushing.numbers, bushing.element)
 
 
 def bushing_deflection(observed: Observations, bushing: Bushing) -> Array:
-    """(n, 6): motion of the end `to` from its pose at rest, in the bushing's axes."""
+    """Motion (n, 6) of the end `to` from its undeformed pose, in the bushing's axes."""
     return deflection_of(_end_motions(observed, bushing))
 
 
 def deflection_of(ends: tuple[Array, Array]) -> Array:
-    """(n, 6) of the motion (n, 24) of the place of rest and of the end `to`."""
+    """Deflection (n, 6) from the motions (n, 24) of the undeformed pose and of the end `to`."""
     axes = ends[0][:, 15:24].reshape(-1, 3, 3)
     components = -_wrench_of_ends(ends, _UNIT_STIFFNESS, "bushing6").reshape(-1, 2, 3)
     return np.einsum("nij,nki->nkj", axes, components).reshape(-1, 6)
 
 
 def add_bushing(table: Table, observed: Observations, bushing: Bushing) -> None:
-    """Its quantities under their names: mount.force, mount.deflection.x."""
+    """Add the quantities of a bushing under their names: mount.force, mount.deflection.x."""
     cached_load = cache(lambda: bushing_load(observed, bushing))
     cached_deflection = cache(lambda: bushing_deflection(observed, bushing))
     sources = {
@@ -82,7 +82,7 @@ def add_bushing(table: Table, observed: Observations, bushing: Bushing) -> None:
 
 
 def _end_motions(observed: Observations, bushing: Bushing) -> tuple[Array, Array]:
-    """(n, 24) each: motion of the place of rest that `from` carries, and of the end `to`."""
+    """Motions (n, 24) of the undeformed pose fixed to `from`, and of the end `to`."""
     packed, run = observed.engine.packed, observed.run
     names = [
         element.name if element in packed.scene.bushing else "" for element in packed.scene.forces
@@ -94,7 +94,7 @@ def _end_motions(observed: Observations, bushing: Bushing) -> tuple[Array, Array
 
 
 def _wrench_of_ends(ends: tuple[Array, Array], numbers: tuple[float, ...], element: str) -> Array:
-    """(n, 6); nan where a state cannot be evaluated."""
+    """Force and moment (n, 6); nan where a state cannot be evaluated."""
     is_finite = np.asarray(np.isfinite(np.hstack(ends)).all(axis=1))
     inputs: dict[str, Array] = {
         "p": np.array(numbers), "t": np.zeros(1), "effort": np.zeros(1),

@@ -23,7 +23,7 @@ _FORCE = QuantityKind("N", "force on the end `to`", XYZ, ())
 
 
 def add_constraint(table: Table, observed: Observations, one: Constraint) -> None:
-    """Its quantities under their names: rod.force, rod.load, road.friction, wire.s."""
+    """Add the quantities of a constraint: rod.force, rod.load, road.friction, wire.s."""
     name, owner = one.name, f"constraint {one.name}"
 
     def force() -> Array:
@@ -52,7 +52,7 @@ def add_constraint(table: Table, observed: Observations, one: Constraint) -> Non
 
 
 def add_coupling(table: Table, observed: Observations, name: str) -> None:
-    """Its load: what it puts on a coordinate, for a slope of one of its expression by that."""
+    """Add the load of a coupling: the effort on a coordinate per slope of its expression."""
     loops = observed.engine.packed.written.loops
     rows = [] if loops is None else [x.row for x in loops.couplings if x.coupling.name == name]
 
@@ -69,13 +69,13 @@ def _frame_hinge_name(one: Constraint) -> str:
 
 
 def _constraint_force(observed: Observations, one: Constraint) -> Array:
-    """(n, 3), inertial axes."""
+    """Constraint force (n, 3), inertial axes."""
     hinge_index = observed.engine.packed.hinge_position[_frame_hinge_name(one)]
     return observed.columns("loads", (hinge_index, slice(0, 3)))
 
 
 def _load_direction(observed: Observations, one: Constraint) -> Array:
-    """(n, 3) along the load, inertial axes: of a distance from `from` to `to`."""
+    """Direction (n, 3) of the load, inertial axes: for a distance from `from` to `to`."""
     if one.type == DISTANCE:
         difference = _end_position(observed, one, one.to) - _end_position(observed, one, one.from_)
         return np.asarray(difference / np.linalg.norm(difference, axis=1)[:, None])

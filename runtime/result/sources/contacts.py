@@ -1,7 +1,7 @@
-"""Loads of contacts that can only push: those of bodies that roll on a plane.
+"""Loads of unilateral contacts: those of bodies that roll on a plane.
 
-Stops push by their law, and bounces by blows; a rolling constraint keeps its disc on the plane in
-both directions, so that the sign of its normal load has to be looked at.
+Stops push by their law, and bounces by impacts; a rolling constraint keeps its disc on the plane in
+both directions, so the sign of its normal load must be checked.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from ..result_record import Record
 
-#: Parts of the largest load, and of the kinetic energy over the radius, up to which a load that
-#: pulls is rounding.
+#: Parts of the largest load, and of the kinetic energy over the radius, up to which a pulling load
+#: is rounding.
 _LOAD_ROUNDING, _ENERGY_ROUNDING = 1e-6, 1e-9
 
 #: Name of the row of a rolling constraint that carries its normal load.
@@ -34,9 +34,9 @@ _REMEDY = (
 
 
 def find_pulling_contacts(result: Record) -> Iterator[Risk]:
-    """A risk for each rolling constraint whose normal load pulls in a sample of the run.
+    """Find the rolling constraints whose normal load pulls in a sample of the run.
 
-    Loads that rigid bodies leave open are judged by their sum; that their share pulls is advice.
+    Indeterminate reactions are checked by their sum; a pulling share is only a note.
     """
     model = result.model
     rolling = [constraint for constraint in model.scene.constraint if constraint.type == ROLLING]
@@ -66,7 +66,7 @@ def find_pulling_contacts(result: Record) -> Iterator[Risk]:
 
 
 def _load_rounding(result: Record, one: Constraint, loads: dict[str, Array]) -> float:
-    """Size of a load (N) that is rounding."""
+    """Largest load (N) that is rounding."""
     energy = result.quantity("energy.kinetic").values
     largest = max(float(np.nanmax(np.abs(load), initial=0.0)) for load in loads.values())
     assert one.radius is not None
@@ -80,7 +80,7 @@ def _pulling_risk(
     t: Array, name: str, load: Array, bound: float, what: str = "its normal load",
     doubt: bool = True,
 ) -> Iterator[Risk]:  # fmt: skip
-    """The risk of a contact with this load (n,) in N, where that pulls by more than `bound`."""
+    """Finding of a contact load (n,) in N that pulls by more than `bound`."""
     pulls = load < -bound
     if not pulls.any():
         return

@@ -1,4 +1,4 @@
-"""Euler angles of orientations: turned about z, then about the new y, then about the newest x.
+"""Euler angles of orientations: rotations about z, then the new y, then the newest x.
 
 Of a rotation R = Rz(yaw) Ry(pitch) Rx(roll), body to inertial or outboard to inboard axes.
 """
@@ -16,15 +16,15 @@ EULER_KIND = QuantityKind(
     "rad", "Euler angles about z, y', x''", ("yaw", "pitch", "roll"), ("yaw", "pitch", "roll")
 )
 
-#: cos(pitch) below which yaw and roll are one and the same turn, and below which they swing.
+#: Values of cos(pitch) below which yaw and roll coincide, and below which they vary rapidly.
 _MIN_COS_PITCH, _MAX_WARNED_COS_PITCH = 1e-7, 0.05
 
 
 def euler_angles(matrices: Array) -> Array:
-    """(n, 3): yaw, pitch, roll of rotation matrices (n, 9), row by row; continuous over the rows as
-    long as neighbours are less than half a turn apart.
+    """Euler angles (n, 3), yaw, pitch, roll, of rotation matrices (n, 9), row by row.
 
-    Where the pitch is +-pi/2 only yaw -+ roll is known: the roll stays that of the row before.
+    Continuous over the rows if neighbours differ by less than half a turn. Where the pitch is
+    +-pi/2 only yaw -+ roll is known: the roll stays that of the previous row.
     """
     r = matrices.reshape(-1, 3, 3)
     cos_pitch = np.hypot(r[:, 0, 0], r[:, 1, 0])
@@ -38,7 +38,7 @@ def euler_angles(matrices: Array) -> Array:
 
 
 def _unwrap(angles: Array) -> Array:
-    """Without jumps by full turns, over the rows that are known."""
+    """Angles without jumps by full turns, over the rows with known values."""
     is_finite = np.isfinite(angles)
     angles = angles.copy()
     angles[is_finite] = np.unwrap(angles[is_finite])
@@ -46,7 +46,7 @@ def _unwrap(angles: Array) -> Array:
 
 
 def gimbal_note(angles: Array) -> str:
-    """A sentence where yaw and roll are told apart badly; "" where they are not."""
+    """Note where yaw and roll are poorly distinguished; "" otherwise."""
     cos_pitch = np.cos(angles[:, 1])
     near_samples = np.flatnonzero(cos_pitch < _MAX_WARNED_COS_PITCH)
     if not len(near_samples):

@@ -1,5 +1,7 @@
-"""Quantities of hinges, and of the modes of flexible bodies: coordinates, speeds, efforts, loads,
-powers, what motors and drives put in, Euler angles."""
+"""Quantities of hinges and of the modes of flexible bodies.
+
+Coordinates, speeds, efforts, loads, powers, power inputs of motors and drives, Euler angles.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,7 @@ from .euler_angles import EULER_KIND, euler_angles, gimbal_note, rotation_matric
 
 
 def add_hinge(table: Table, acting: AppliedLoads, hinge: HingeSlots) -> None:
-    """Of a hinge: by its own names and by number, shoulder.angle, shoulder.q[0]."""
+    """Add the quantities of a hinge by name and by index: shoulder.angle, shoulder.q[0]."""
     observed, owner = acting.observed, f"hinge {hinge.name}"
     group = _add_motion(table, acting, hinge, owner)
     units = [effort_unit(unit) for unit in hinge.u_units]
@@ -52,7 +54,7 @@ def add_hinge(table: Table, acting: AppliedLoads, hinge: HingeSlots) -> None:
 
 
 def _add_powers(table: Table, acting: AppliedLoads, hinge: HingeSlots, efforts: Values) -> None:
-    """Of all that acts along the speeds; and what of it drives and `law.effort` put in."""
+    """Add the power of all efforts along the speeds, and the inputs of drives and `law.effort`."""
     owner, run = f"hinge {hinge.name}", acting.observed.run
 
     def power(of: Values) -> Array:
@@ -83,7 +85,7 @@ def _add_powers(table: Table, acting: AppliedLoads, hinge: HingeSlots, efforts: 
 
 
 def effort_slots(system: System, body: int, count: int) -> tuple[int, ...]:
-    """Where the efforts that laws are given stand among the values, speed by speed; -1 for none."""
+    """Indices of the given efforts of laws among the values, speed by speed; -1 for none."""
     slots = [-1] * count
     for run in system.laws:
         repeat, member = divmod(body - run.place, run.period)
@@ -96,14 +98,14 @@ def effort_slots(system: System, body: int, count: int) -> tuple[int, ...]:
 
 
 def add_modes(table: Table, acting: AppliedLoads, body: HingeSlots) -> None:
-    """Modal coordinates of a flexible body, their speeds and accelerations: blade.y1."""
+    """Add modal coordinates of a flexible body, their speeds and accelerations: blade.y1."""
     _add_motion(table, acting, body, f"flexible body {body.name}", straight=True)
 
 
 def _add_motion(
     table: Table, acting: AppliedLoads, slots: HingeSlots, owner: str, straight: bool = False
 ) -> _Group:
-    """q, u and udot."""
+    """Add q, u and udot of a hinge or of modes."""
     run, group = acting.observed.run, _Group(table, slots.name, owner)
     rates = [rate_unit(unit) for unit in slots.u_units]
     accelerations = [acceleration_name(name) for name in slots.u_names]
@@ -123,7 +125,7 @@ def _add_motion(
 
 @dataclass
 class _Group:
-    """Columns of one hinge under their own names and by number: shoulder.angle, shoulder.q[0]."""
+    """Columns of one hinge by name and by index: shoulder.angle, shoulder.q[0]."""
 
     table: Table
     hinge: str
@@ -133,7 +135,7 @@ class _Group:
         self, short: str, names: Sequence[str], units: Sequence[str], get: Values,
         rates: Values | None = None,
     ) -> None:  # fmt: skip
-        """One kind of quantity, one name and unit per column."""
+        """Add one kind of quantity, with one name and unit per column."""
         for k, (name, unit) in enumerate(zip(names, units, strict=True)):
             full_name, label = f"{self.hinge}.{name}", name.replace("_", " ")
             self.table.scalar(full_name, unit, label, get, k, rates, owner=self.owner)

@@ -1,4 +1,4 @@
-"""Loads over a run: force and moment in inertial axes, and the power that they bring."""
+"""Loads over a run: force and moment in inertial axes, and their power."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .applied_loads import AppliedLoads
 if TYPE_CHECKING:
     from mstmm.scene import Load
 
-#: Quantities of a load.  One per length is told by what it adds up to.
+#: Quantities of a load. A load per length is given by its resultant.
 LOAD_QUANTITIES = {
     "force": QuantityKind("N", "force", XYZ, ("fx", "fy", "fz")),
     "moment": QuantityKind("N*m", "moment", XYZ, ("mx", "my", "mz")),
@@ -23,7 +23,7 @@ LOAD_QUANTITIES = {
 
 
 def add_load(table: Table, acting: AppliedLoads, load: Load, number: int) -> None:
-    """Its quantities under their names: wind.force, wind.moment where it has one, wind.power."""
+    """Add the quantities of a load: wind.force, wind.moment if it has one, wind.power."""
     numbers, owner = acting.system.loads[number], f"load {load.name}"
 
     def force() -> Array:
@@ -47,6 +47,6 @@ def add_load(table: Table, acting: AppliedLoads, load: Load, number: int) -> Non
 
 
 def inertial_components(acting: AppliedLoads, number: int, places: tuple[int, ...]) -> Array:
-    """(n, 3): three components of a load in inertial axes."""
+    """Components (n, 3) of a load, three of them, in inertial axes."""
     axes = acting.load(number)[1][:, 15:24].reshape(-1, 3, 3)
     return np.einsum("nij,nj->ni", axes, acting.at(places))

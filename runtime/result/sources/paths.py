@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
     from ...engine.compiled_scene import CompiledScene
 
-#: A cubic with slopes r at the ends of h leaves its chord by max |r - chord| h / 4, and its slope
-#: those three by half their spread; the rest is room for higher orders.
+#: A cubic with slopes r at the ends of h deviates from its chord by max |r - chord| h / 4, and its
+#: slope exceeds those three by half their spread; the rest is a margin for higher orders.
 _HIGHER_ORDER_MARGIN = 1.5
 
 
 @dataclass(frozen=True)
 class RunStates:
-    """Times (n,), ascending, states and memory of a run at its steps, or at some of them."""
+    """Times (n,), ascending, states and memory of a run at all or some of its steps."""
 
     t: Array
     q: Array
@@ -38,7 +38,7 @@ class RunStates:
 
 @dataclass(frozen=True)
 class SampledVariable:
-    """A number along a run: its values (n,) at the states, and its rates (n,) there."""
+    """Variable along a run: its values (n,) and rates (n,) at the states."""
 
     values: Array
     rates: Array
@@ -47,8 +47,7 @@ class SampledVariable:
 def sampled_variables(
     model: CompiledScene, states: RunStates, one: ActiveExpression, own: Hinge | None
 ) -> dict[str, SampledVariable] | None:
-    """What the names of an expression are along a run, by their text; None where one of them is
-    not known."""
+    """Variables of an expression along a run, by name; None if one of them is unknown."""
     constants = dict(one.constants)
     length = None if one.spring is None else _spring_length(model, states, one)
     variables = dict[str, SampledVariable]()
@@ -90,14 +89,14 @@ def _sampled_variable(
 
 
 def _with_parabola_rates(t: Array, values: Array) -> SampledVariable:
-    """With rates from parabolas through neighbours."""
+    """Variable with rates from parabolas through neighbours."""
     if len(t) < 3:
         return SampledVariable(values, np.full(len(t), (values[-1] - values[0]) / (t[-1] - t[0])))
     return SampledVariable(values, np.gradient(values, t, edge_order=2))
 
 
 def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> SampledVariable:
-    """An input or signal; one that is held stands still in every step."""
+    """Input or signal along a run; one that is held is constant in every step."""
     slot = model.packed.system.held.places[list(model.packed.channels).index(name)]
     if slot >= 0:
         return SampledVariable(states.memory[:, slot], np.zeros(len(states.t)))
@@ -129,8 +128,11 @@ def _spring_length(
 def make_enclosures(
     t: Array, known: Mapping[str, SampledVariable], names: Sequence[str]
 ) -> Callable[[Interval], Mapping[str, Enclosure]]:
-    """Enclosures of names over cells of time (s), none of which lies across one of the times t
-    (n,): those of cubics between the states, with some room."""
+    """Enclosures of names over cells of time (s).
+
+    They are those of cubics between the states, with a margin. No cell may contain one of the times
+    t (n,) in its interior.
+    """
 
     def leaves(cells: Interval) -> dict[str, Enclosure]:
         lo, hi = np.broadcast_arrays(cells.lo, cells.hi)
@@ -170,7 +172,7 @@ def _enclosure_in_steps(
 def _cubic_value_and_slope(
     x: Array, h: Array, a: Array, b: Array, rate_a: Array, rate_b: Array
 ) -> tuple[Array, Array]:
-    """Value and slope at x, 0 to 1, of a cubic over h by its values and slopes at both ends."""
+    """Value and slope at x, 0 to 1, of a cubic over h from values and slopes at both ends."""
     chord = (b - a) / h
     left, right = rate_a - chord, chord - rate_b
     value = a + x * (b - a) + h * x * (1 - x) * ((1 - x) * left + x * right)

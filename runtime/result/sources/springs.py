@@ -39,8 +39,10 @@ _FORCE = QuantityKind("N", "force on the end `to`", XYZ, ("fx", "fy", "fz"))
 
 
 def length_and_rate(apart: Array) -> tuple[Array, Array]:
-    """Lengths (n,) and their rates (n,) of positions and velocities (n, 6) of one end beside the
-    other; nan where the ends meet."""
+    """Lengths (n,) and rates (n,) from relative positions and velocities (n, 6) of the ends.
+
+    nan where the ends coincide.
+    """
     length = np.linalg.norm(apart[:, :3], axis=1)
     product = np.einsum("ni,ni->n", apart[:, :3], apart[:, 3:6])
     return length, np.divide(product, length, out=np.full_like(length, np.nan), where=length > 0)
@@ -53,7 +55,7 @@ def spring_motion(observed: Observations, spring: Spring) -> tuple[Array, Array]
 
 
 def spring_effort(acting: AppliedLoads, spring: Spring) -> Array:
-    """(n,) in N.  SceneError for an element of a user's own type, whose law is not known here."""
+    """Effort (n,) in N. SceneError for a user-defined element, whose law is unknown here."""
     if spring.type != "spring":
         raise SceneError(
             f'"{spring.name}.effort": the law of a force element "{spring.type}" is not known to '
@@ -65,7 +67,7 @@ def spring_effort(acting: AppliedLoads, spring: Spring) -> Array:
 
 
 def motor_effort(acting: AppliedLoads, spring: Spring) -> Array:
-    """(n,) in N: what its `law.effort` puts in."""
+    """Effort (n,) in N of `law.effort`."""
     scene = acting.observed.engine.packed.scene
     number = next(
         k for k, spring_of_scene in enumerate(scene.spring) if spring_of_scene.name == spring.name
@@ -79,7 +81,7 @@ def motor_effort(acting: AppliedLoads, spring: Spring) -> Array:
 
 
 def _spring_direction(observed: Observations, spring: Spring) -> Array:
-    """(n, 3): from one end to the other; nan where they meet."""
+    """Vector (n, 3) from one end to the other; nan where they coincide."""
     from_state, to_state = (_end_state(observed, spring, end) for end in (spring.from_, spring.to))
     difference = (to_state - from_state)[:, :3]
     length = np.linalg.norm(difference, axis=1)[:, None]
@@ -87,7 +89,7 @@ def _spring_direction(observed: Observations, spring: Spring) -> Array:
 
 
 def add_spring(table: Table, acting: AppliedLoads, spring: Spring) -> None:
-    """Its quantities under their names: strut.length, strut.effort, strut.force, strut.power."""
+    """Add the quantities of a spring: strut.length, strut.effort, strut.force, strut.power."""
     observed, owner, built_in = acting.observed, f"spring {spring.name}", spring.type == "spring"
     cached_motion = cache(lambda: spring_motion(observed, spring))
     get: dict[str, Values] = {
@@ -127,7 +129,7 @@ def add_spring(table: Table, acting: AppliedLoads, spring: Spring) -> None:
 
 
 def _end_state(observed: Observations, spring: Spring, end: str) -> Array:
-    """(n, 6): position and velocity; a spring says itself where it is on the ground."""
+    """Position and velocity (n, 6) of an end; the spring holds the position on the ground."""
     if end == "ground":
         return np.tile([*spring.position, 0.0, 0.0, 0.0], (len(observed.run.t), 1))
     return observed.points(end)[:, :6]
