@@ -8,7 +8,7 @@ from mstmm.array_validation import Array
 
 from .solid_meshes import Faces, axes_along, tube_faces
 
-#: Corners around the shaft; radius of the head by that of the shaft, and its length by it.
+#: Corners around the shaft; radius and length of the head, relative to the radius of the shaft.
 _CORNERS_AROUND, _HEAD_RADIUS_RATIO, _HEAD_LENGTH_RATIO = 10, 2.4, 6.0
 #: Shafts of short arrows are thinner: at most this part of the length, or of the radius of a
 #: circular arrow.

@@ -87,7 +87,7 @@ def write_strip(shots: Sequence[Frame], file: Path | IO[bytes], kind: str, title
 
 
 def _column_count(count: int, shape: float) -> int:
-    """Frames in a row, chosen so that the strip is about wider than tall."""
+    """Frames in a row, about as many as make the strip wider than tall."""
     max_columns = (
         _MAX_STRIP_COLUMNS if shape > 0.8 else max(1, int(np.ceil(np.sqrt(count * shape * 2.2))))
     )

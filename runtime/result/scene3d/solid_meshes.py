@@ -49,7 +49,7 @@ def box_surface(size: ArrayLike) -> Surface:
     """Box about the origin with these three edge lengths."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / 2
     quads = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    vertices = corners[[k for quad in quads for k in quad]]  # shared by no two faces: sharp
+    vertices = corners[[k for quad in quads for k in quad]]  # faces share none: sharp edges
     first = 4 * np.arange(6)[:, None]
     faces = np.concatenate([first + np.array(corner) for corner in ((0, 1, 2), (0, 2, 3))])
     return Surface(vertices * np.asarray(size, dtype=np.float64), faces)

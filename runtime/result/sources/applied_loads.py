@@ -34,7 +34,7 @@ class AppliedLoads:
 
     @cached_property
     def given(self) -> dict[str, Array]:
-        """Values that expressions read: t, q, u and the inputs, held ones from memory."""
+        """Values that expressions read: t, q, u and the inputs, held inputs from memory."""
         run, held = self.observed.run, self.system.held
         inputs = np.array([self.system.inputs_at(t) for t in run.t.tolist()])
         inputs = inputs.reshape(len(run.t), NUMBERS_PER_PIECE * len(self.system.inputs))

@@ -47,6 +47,6 @@ def add_load(table: Table, acting: AppliedLoads, load: Load, number: int) -> Non
 
 
 def inertial_components(acting: AppliedLoads, number: int, places: tuple[int, ...]) -> Array:
-    """Components (n, 3) of a load, three of them, in inertial axes."""
+    """Inertial components (n, 3) of the three values of a load at `places`."""
     axes = acting.load(number)[1][:, 15:24].reshape(-1, 3, 3)
     return np.einsum("nij,nj->ni", axes, acting.at(places))

@@ -96,7 +96,7 @@ def _with_parabola_rates(t: Array, values: Array) -> SampledVariable:
 
 
 def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> SampledVariable:
-    """Input or signal along a run; one that is held is constant in every step."""
+    """Input or signal along a run; a held input is constant in every step."""
     slot = model.packed.system.held.places[list(model.packed.channels).index(name)]
     if slot >= 0:
         return SampledVariable(states.memory[:, slot], np.zeros(len(states.t)))

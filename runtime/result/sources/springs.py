@@ -129,7 +129,7 @@ def add_spring(table: Table, acting: AppliedLoads, spring: Spring) -> None:
 
 
 def _end_state(observed: Observations, spring: Spring, end: str) -> Array:
-    """Position and velocity (n, 6) of an end; the spring holds the position on the ground."""
+    """Position and velocity (n, 6) of an end; on the ground, the position in the spring."""
     if end == "ground":
         return np.tile([*spring.position, 0.0, 0.0, 0.0], (len(observed.run.t), 1))
     return observed.points(end)[:, :6]
