@@ -173,8 +173,8 @@ class BatchResult(AssessedAnswer, BatchData):
     ) -> Any:
         """`matplotlib` figure of quantities over time, as `Result.plot` (extra: plot).
 
-        A line for each run, or, for more than twelve or if `band` is true, the median and a band
-        from 5 to 95 %.
+        A line for each run, or, for more than twelve, the median and a band from 5 to 95 %; `band`
+        overrides this choice.
         """
         from .plotting.figure import compose_panels, draw_runs
 

@@ -201,8 +201,8 @@ def _unsupported_axes(
 ) -> tuple[list[bool], list[bool]]:
     """Components of force, and of moment about the pivot, that the ground never transmits.
 
-    Compared with the largest loads of the scene and with its motion, whose kinetic energy limits
-    the loads: where nothing else acts, loads are rounding.
+    Compared with the largest loads of the scene and with its kinetic energy, which scales moments
+    and, over the reach, forces: where nothing else acts, loads are rounding.
     """
     scene = result.model.scene
     roots = _ground_hinges(scene)

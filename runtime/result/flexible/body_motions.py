@@ -31,7 +31,7 @@ class FlexibleBodies:
         self.model, self.observed, self.run = model, observed, observed.run
         self.known: Mapping[str, ModalBody] = model.flexible
         self.one_way: Collection[str] = ()  # one-way bodies, not part of the run
-        self.unbalanced: Collection[str] = ()  # their motion omits the loads on their ends
+        self.unbalanced: Collection[str] = ()  # their end loads omit their vibration
         self._motions: dict[str, Motion] = {}
 
     def body(self, name: str, what: str) -> ModalBody:

@@ -99,7 +99,10 @@ def _modal_speed_indices(model: CompiledScene, name: str) -> list[int]:
 def _participation_of_modes(
     inertia: Array, own: list[int], modes: list[int], others: list[int]
 ) -> Array:
-    """Participation chi of modes; `others` are the speed indices of hinges outboard."""
+    """Participation chi of modes from the mass matrix.
+
+    `own`, `modes` and `others` are speed indices of the hinge, the modes and the outboard hinges.
+    """
     indices, hinge_count = [*own, *modes], len(own)
     block = inertia[np.ix_(indices, indices)]
     if others:
