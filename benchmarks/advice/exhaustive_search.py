@@ -116,7 +116,7 @@ def truth_in_parts(known: Truth, wholes: set[str], t_end: float) -> Truth | None
 
 def _divisible(scene: mstmm.Scene, wholes: set[str]) -> mstmm.Scene:
     """The scene whose beams have nothing that belongs to shapes of the whole."""
-    bodies = mstmm.compile(scene, engine="looped").flexible
+    bodies = mstmm.compile(scene, engine="looped").flexible_bodies
     beams = (
         make_splittable(beam, float(modal_frequencies(bodies[beam.name])[0]))[0]
         if beam.name in wholes
@@ -133,7 +133,7 @@ def _agreed(
     runs = [found[0] for name, rtol in _TRUTH if (found := single(model, t_end, name, rtol))]
     numbers = [measure.read(run) for run in runs]
     pairs = [
-        (float(measure.apart(a, b).max()), i)
+        (float(measure.distance(a, b).max()), i)
         for i, a in enumerate(numbers)
         for b in numbers[i + 1 :]
     ]
@@ -208,7 +208,7 @@ def _curves(
 
 
 def _error(known: Truth, result: mstmm.Result) -> float:
-    return float(known.measure.apart(known.measure.read(result), known.numbers).max())
+    return float(known.measure.distance(known.measure.read(result), known.numbers).max())
 
 
 def cheapest(made: list[Single], asked: float, sure: bool) -> Single | None:

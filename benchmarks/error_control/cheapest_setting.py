@@ -95,7 +95,7 @@ def reference(model: mstmm.Model, t_end: float) -> Reference | None:
     for a, q in runs.items():
         measure.scale_by(q)
         pairs += [
-            (float(measure.apart(q, other).max()), a, b)
+            (float(measure.distance(q, other).max()), a, b)
             for b, other in runs.items()
             if a[0] != b[0]
         ]
@@ -116,7 +116,7 @@ def singles(
             made = single(model, t_end, method, rtol)
             if made is None:
                 break
-            error = float(truth.measure.apart(truth.numbers, made[0].q).max())
+            error = float(truth.measure.distance(truth.numbers, made[0].q).max())
             found.append(Single(method, rtol, error, made[1]))
             better = [one.cpu_s for one in found if one.error <= max(error, least)]
             if error < least or made[1] > _HOPELESS * min(better):

@@ -78,8 +78,8 @@ def hinge_facts(hinge: Hinge, kernels: Sequence[KernelIR]) -> HingeProperties:
     """Free directions and input keys of a hinge, from its kernel "hinge"."""
     motion = next(kernel for kernel in kernels if kernel.name == "hinge")
     return hinge_properties(
-        motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame,
-        hinge.keys, hinge.allows or hinge.title,
+        motion, hinge.name, hinge.coordinates, speeds_of(hinge), hinge.parameters, hinge.frame_rule,
+        hinge.scene_keys, hinge.motion_text or hinge.title,
     )  # fmt: skip
 
 
@@ -87,12 +87,12 @@ def all_facts(specs: Sequence[ElementSpec]) -> list[HingeProperties]:
     """Properties of the built-in hinges, by increasing number of speeds."""
     facts_by_name = {spec.name: spec.facts for spec in specs if spec.facts is not None}
     for hinge in builtin_hinges():
-        if hinge.runs_as:
+        if hinge.equivalent_builtin:
             facts_by_name[hinge.name] = replace(
-                facts_by_name[hinge.runs_as],
+                facts_by_name[hinge.equivalent_builtin],
                 name=hinge.name,
-                allows=hinge.allows,
-                runs_as=hinge.runs_as,
+                allows=hinge.motion_text,
+                runs_as=hinge.equivalent_builtin,
             )
     return sorted(facts_by_name.values(), key=lambda facts: (len(facts.speeds), facts.name))
 

@@ -156,7 +156,7 @@ def hinge_kernels(hinge: Hinge) -> tuple[Kernel, ...]:
         kernels.append(
             Kernel("eliminate", eliminate_factored(nu, subspace, inputs[:2], hinge.name))
         )
-    measure = hinge.singular_when(motion.q, motion.p)
+    measure = hinge.singularity_measure(motion.q, motion.p)
     if measure is not None:
         kernels.append(Kernel("singularity", _singularity_derivation(motion, measure)))
     return tuple(kernels)

@@ -72,7 +72,7 @@ def statement_text(text: StraightText, statement: Line, guards: Guards) -> list[
         return text.assign(statement)
     if isinstance(statement, Store):
         return [text.store(statement)]
-    return guards.judged(statement)
+    return guards.emit_guard(statement)
 
 
 class FunctionParts:

@@ -25,11 +25,11 @@ class Guards:
         #: Whether GUARDS counts them during evaluation.
         self.counted = has_guards and not self.in_lanes
 
-    def begun(self) -> list[str]:
+    def prologue(self) -> list[str]:
         """Lines before the first guard."""
         return [f"int {GUARDS_NAME}[2] = {{1, 0}};"] if self.counted else []
 
-    def judged(self, guard: Guard) -> list[str]:
+    def emit_guard(self, guard: Guard) -> list[str]:
         """Lines of one guard; the count is updated at the next different code."""
         truth, earlier = self._text.truth(guard.condition), self._found[-1:]
         self._found.append((truth, guard.code))

@@ -159,7 +159,7 @@ def function_text(kernel: KernelIR, name: str, dialect: Dialect) -> str:
         lines += (_lane_sincos_lines if dialect.vector else _vector_sincos_lines)(
             text, level.angles
         )
-    lines += guards.begun()
+    lines += guards.prologue()
     if parts is None:
         lines += [
             line for statement in statements for line in statement_text(text, statement, guards)

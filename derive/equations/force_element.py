@@ -142,7 +142,7 @@ def wrench_guards(element: ForceElement) -> tuple[tuple[sp.Basic, int, str], ...
     """Condition stated by the element, in terms of the arrays of the kernel."""
     p = Symbols("p", tuple(x.name for x in element.parameters))
     _, arrays = relative_motion()
-    condition = element.defined_within(_explicit(arrays[0]), _explicit(arrays[2]), p)
+    condition = element.domain_by_rotation(_explicit(arrays[0]), _explicit(arrays[2]), p)
     if condition is None:
         return ()
     replace = {s: vector("p", len(p))[i, 0] for i, s in enumerate(p)}

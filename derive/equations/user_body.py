@@ -27,9 +27,9 @@ FRAME = 12
 
 def _columns(body: Body) -> tuple[Symbols, sp.MatrixSymbol, Quantity]:
     p = Symbols("p", tuple(x.name for x in body.parameters))
-    array = vector("p", len(p) + (0 if body.in_hinge_axes else FRAME))
+    array = vector("p", len(p) + (0 if body.uses_hinge_axes else FRAME))
     meaning = describe_array("parameters", body.parameters)
-    meaning += "; body axes, about its input end" if body.in_hinge_axes else "; then R_u and r_u"
+    meaning += "; body axes, about its input end" if body.uses_hinge_axes else "; then R_u and r_u"
     return p, array, Quantity(array, "", meaning)
 
 
@@ -87,7 +87,7 @@ def inertia(body: Body) -> Derivation:
 def bias_load(body: Body) -> Derivation:
     """e of the single body: residual at the bias motion."""
     p, array, parameters = _columns(body)
-    carried = () if body.in_hinge_axes else _motion_equations(body, array)
+    carried = () if body.uses_hinge_axes else _motion_equations(body, array)
     motion = carried[-1].left if carried else MOTION.symbol
     residual = body.residual(_triple(motion, 6), _triple(motion, 3), _triple(motion, 0), p)
     return Derivation(
@@ -105,7 +105,7 @@ def kinetic_energy(body: Body) -> Derivation:
     p, array, parameters = _columns(body)
     v, w = vector("v", 3), vector("w", 3)
     energy = sp.MatrixSymbol("T", 1, 1)
-    carried = () if body.in_hinge_axes else _velocity_equations(body, array, v, w)
+    carried = () if body.uses_hinge_axes else _velocity_equations(body, array, v, w)
     v_own, w_own = (carried[1].left, carried[0].left) if carried else (v, w)
     value = sp.Matrix([[body.kinetic_energy(_triple(v_own, 0), _triple(w_own, 0), p)]])
     return Derivation(
@@ -124,7 +124,7 @@ def kinetic_energy(body: Body) -> Derivation:
 def _mass_equations(
     body: Body, array: sp.MatrixSymbol, mass: sp.ImmutableDenseMatrix
 ) -> tuple[Equation, ...]:
-    if body.in_hinge_axes:
+    if body.uses_hinge_axes:
         return (Equation("S = d residual / d acceleration", S.symbol, mass),)
     body_mass, (_, _, x) = sp.MatrixSymbol("S_O", 6, 6), _frame(body, array)
     carry = sp.MatrixSymbol("X", 6, 6)
@@ -155,7 +155,7 @@ def _motion_equations(body: Body, array: sp.MatrixSymbol) -> tuple[Equation, ...
 def _load_equations(
     body: Body, array: sp.MatrixSymbol, residual: sp.ImmutableDenseMatrix
 ) -> tuple[Equation, ...]:
-    if body.in_hinge_axes:
+    if body.uses_hinge_axes:
         return (Equation("e = residual at the bias motion", E.symbol, residual),)
     body_load, carry, (_, _, x) = vector("e_O", 6), sp.MatrixSymbol("X", 6, 6), _frame(body, array)
     return (

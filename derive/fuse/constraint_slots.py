@@ -80,7 +80,7 @@ class RowSlots(Slots):
             for coupling in self.state.structure.couplings
         )
 
-    def met(self, of: str) -> Iterator[Subject]:
+    def subjects(self, of: str) -> Iterator[Subject]:
         """Subjects that a `ForEach` step visits."""
         at, rows = self.at, self.state.structure.rows
         if of in ("closings", "openings"):

@@ -122,7 +122,7 @@ class _CoordinateIncrements:
                 self._speed_of_coordinate |= {
                     body.modal.q + k: body.modal.u + k for k in range(body.modal.n)
                 }
-            rates = replay.filled(index, "body.qdot") or []
+            rates = replay.value(index, "body.qdot") or []
             first, speeds = q[body.q : body.q + body.nq], u[body.u : body.u + body.nu]
             slopes = [derivatives(rates, {variable: 1}) for variable in first]
             by_speeds = [derivatives(rates, {variable: 1}) for variable in speeds]
@@ -180,7 +180,7 @@ class _RateKernels:
         self._structure = structure
         state = FusionState(structure, kernels, None)
         self._graph, self._increments = state.graph, _CoordinateIncrements(state)
-        self._rates = self._increments.replay.gathered("qdot")
+        self._rates = self._increments.replay.collect("qdot")
         for index in _prescribed_coordinates(structure):
             self._rates[index] = state.zero
 
@@ -218,7 +218,7 @@ class _ResidualKernels:
         self._a, self._increments = state.given, _CoordinateIncrements(state)
         replay = ScheduleInterpreter(state, staged=False, inverse=True)
         replay.sweep(INVERSE_DYNAMICS)
-        required = replay.gathered("required")
+        required = replay.collect("required")
         terms = zip(required, state.u, self._is_prescribed, strict=True)
         self._power = sum(
             (load * speed for load, speed, imposed in terms if imposed),

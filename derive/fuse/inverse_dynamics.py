@@ -31,7 +31,7 @@ def fuse_inverse(structure: Structure, kernels: Kernels) -> FusedSceneIR:
         state.graph.guard(condition, FAILED, "the looped engine names what fails")
     inputs = [*inputs_of(structure)[:-1], Port("a", (structure.nu,))]
     outputs = [Port("required", (structure.nu,))]
-    values: dict[str, object] = {"required": replay.gathered("required")}
+    values: dict[str, object] = {"required": replay.collect("required")}
     kernel_list = [state.graph.kernel("required", inputs, outputs, values, as_made=True)]
     if not any(body.modal for body in structure.bodies):
         state = FusionState(structure, kernels, None)

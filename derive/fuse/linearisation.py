@@ -74,7 +74,7 @@ def fuse_required(structure: Structure, kernels: Kernels) -> KernelIR:
     """Kernel "required": efforts R (nu) by inverse dynamics; inputs as in `fuse_linear`."""
     state = FusionState(structure, kernels, None)
     outputs = [Port("required", (structure.nu,))]
-    values: dict[str, object] = {"required": _inverse_dynamics(state).gathered("required")}
+    values: dict[str, object] = {"required": _inverse_dynamics(state).collect("required")}
     return state.graph.kernel("required", _inputs(structure), outputs, values, as_made=True)
 
 
@@ -87,11 +87,11 @@ class _StateDerivatives:
         self._q, self._u, self._a = list(state.q), list(state.u), list(state.given)
         rates = ScheduleInterpreter(state, staged=False)
         rates.sweep(RATES)
-        self._rates = rates.gathered("qdot")
+        self._rates = rates.collect("qdot")
         self.moves = [derivatives(self._rates, {self._u[j]: 1}) for j in free]
         replay = _inverse_dynamics(state)
         self.conditions = replay.conditions
-        required = replay.gathered("required")
+        required = replay.collect("required")
         self.r = [required[j] for j in free]
 
     def along(self, port: str, index: int, node: Node) -> Node:

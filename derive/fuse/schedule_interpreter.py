@@ -216,7 +216,7 @@ class ScheduleInterpreter(RowSlots):
 
     def _for_each(self, step: ForEach) -> None:
         at, local = self.at, self.local
-        for subject in self.met(step.of):
+        for subject in self.subjects(step.of):
             self.at = subject
             self.steps(_with_entry(inner, "c", subject.direction) for inner in step.steps)
         self.at, self.local = at, local

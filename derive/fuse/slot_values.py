@@ -134,21 +134,21 @@ class Slots:
         else:
             f.u[self.body.u + speed] = node
 
-    def filled(self, index: int, slot: str) -> Nodes | None:
+    def value(self, index: int, slot: str) -> Nodes | None:
         """Nodes stored in a slot of a body; None if it is empty."""
         return self._filled.get((index, slot))
 
-    def gathered(self, name: str) -> Nodes:
+    def collect(self, name: str) -> Nodes:
         """Slot `name` of all bodies and their modes, in the order of the state."""
         s = self.state.structure
         vector = self.state.zeros(s.nq if name == "qdot" else s.nu)
         for index, body in enumerate(s.bodies):
             first = body.q if name == "qdot" else body.u
-            nodes = self.filled(index, f"body.{name}") or []
+            nodes = self.value(index, f"body.{name}") or []
             vector[first : first + len(nodes)] = nodes
             if body.modal is not None:
                 first = body.modal.q if name == "qdot" else body.modal.u
-                vector[first : first + body.modal.n] = self.filled(index, f"modes.{name}") or []
+                vector[first : first + body.modal.n] = self.value(index, f"modes.{name}") or []
         return vector
 
     def _key(self, slot: str) -> Hashable:

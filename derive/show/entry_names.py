@@ -139,7 +139,7 @@ def declared_names(
     """Names of the arrays p, q and u and of the arrays that correspond to them."""
     groups = {"p": tuple(parameters), "q": tuple(coordinates), "u": tuple(speeds)}
     parts_by_array = {
-        array: tuple(NamedPart(x.name, x.unit, x.meaning) for x in group)
+        array: tuple(NamedPart(x.name, x.unit, x.description) for x in group)
         for array, group in groups.items()
     }
     q, u = (tuple(x.name for x in groups[array]) for array in "qu")

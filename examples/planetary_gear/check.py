@@ -39,8 +39,11 @@ def main() -> None:
     """All three statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"{loops.rank} of {len(loops.rows)} rows count, {loops.mobility} motions are left")
-    assert (loops.rank, len(loops.rows), loops.mobility) == (4, 6, 2)
+    print(
+        f"{loops.rank} of {len(loops.constraint_rows)} rows count, {loops.mobility} motions are "
+        f"left"
+    )
+    assert (loops.rank, len(loops.constraint_rows), loops.mobility) == (4, 6, 2)
 
     times = np.linspace(0.0, 0.5, 201)
     result = model.simulate(0.5, "dop853", rtol=1e-11, output_times=times)

@@ -70,7 +70,7 @@ def check_published(model: mstmm.Model) -> None:
     worst = 0.0
     for part, speeds in PUBLISHED.items():
         for known in speeds:
-            locus = model.locus("constants.spin", [part * known * RPM])
+            locus = model.root_locus("constants.spin", [part * known * RPM])
             assert locus.frame == "fixed"
             worst = max(worst, abs(near(locus.frequency[0] * 60, known) / known - 1))
     print(f"isotropic bearings: whirl speeds as published to {worst:.1e}")
@@ -81,7 +81,7 @@ def check_elements(model: mstmm.Model, name: str, bearing: Array) -> None:
     """Whirl speeds of the finite elements."""
     worst, spins = 0.0, RPM * np.array([20000.0, 60000.0])
     for spin in spins:
-        locus = model.locus("constants.spin", [spin])
+        locus = model.root_locus("constants.spin", [spin])
         known, found = whole(spin, bearing), np.sort(2 * np.pi * locus.frequency[0])
         worst = max(worst, float(np.abs(found[:10] / known[:10] - 1).max()))
     print(f"{name} bearings: ten whirl speeds as of finite elements to {worst:.1e}")

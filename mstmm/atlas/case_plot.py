@@ -48,7 +48,7 @@ def measure_case(case: CaseDefinition, points: int, tolerance: float) -> Measure
     return MeasuredCase(
         case.name,
         case.title,
-        case.why,
+        case.explanation,
         case.parameter,
         case.unit,
         case.scale.name,

@@ -93,7 +93,7 @@ class Expression:
         )
 
     @property
-    def needed(self) -> frozenset[int]:
+    def required_terms(self) -> frozenset[int]:
         """Indices of the terms that the value depends on."""
         return frozenset(self._needed(self.root))
 

@@ -53,7 +53,7 @@ class InputNodes:
         self._leaves.update({node.number: (name.text, k) for k, node in enumerate(numbers)})
         return polynomial(numbers, self.time)
 
-    def leaf(self, t: float) -> Callable[[Node], float]:
+    def input_value(self, t: float) -> Callable[[Node], float]:
         """Function that returns the value of each leaf at time t (s)."""
 
         def number(node: Node) -> float:

@@ -112,7 +112,7 @@ def plan_closures(mechanism: MechanismGraph, tree: Tree) -> ClosurePlan:
     pending: list[list[int]] = [[] for _ in range(mechanism.bodies)]
     groups_by_body: dict[int, list[int]] = {}
     for number, group in enumerate(groups):
-        for body, _ in paths.crossed(group):
+        for body, _ in paths.crossed_bodies(group):
             pending[body].append(number)
         groups_by_body.setdefault(paths.closes_at(group.ends), []).append(number)
     closures = tuple(_order_closures(paths, groups, pending, groups_by_body))

@@ -36,7 +36,7 @@ class _Search:
         self.across: list[dict[int, int]] = [{} for _ in self.parent]
         self.rows = [0] * len(self.parent)
         for number in mechanism.closures(tree):
-            for body, ends in paths.crossed(self.groups[number]):
+            for body, ends in paths.crossed_bodies(self.groups[number]):
                 self._put(body, number, ends)
 
     def run(self) -> None:

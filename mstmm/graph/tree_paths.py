@@ -74,7 +74,7 @@ class Paths:
         by_rank = sorted(ends, key=self._rank.__getitem__)
         return self.meet(by_rank[0], by_rank[-1])
 
-    def crossed(self, group: RowGroup) -> Iterator[tuple[int, int]]:
+    def crossed_bodies(self, group: RowGroup) -> Iterator[tuple[int, int]]:
         """Bodies across whose inboard hinge a group is pending, with a count of ends.
 
         Yields (body, number of ends on it or outboard of it).

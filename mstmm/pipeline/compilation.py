@@ -30,7 +30,7 @@ class GeneratedElement:
 
     spec: ElementSpec
     folder: Path
-    how: str
+    execution: str
 
 
 def compile_scene(
@@ -82,7 +82,7 @@ def compile_scene(
         raise SceneError(f"{scene!r:.60}: expected a Scene, or the path of a scene file")
     model = compile_level(scene, engine, sweep, accuracy, bake, flexibility, simplify)
     if flexibility is None:
-        model.refuse_unknown_outputs()
+        model.check_outputs()
     return model
 
 

@@ -156,7 +156,7 @@ class Fusion:
             except EnvironmentFailure as error:
                 self.obstacle = str(error)
 
-    def under(self, system: System) -> Self:
+    def for_system(self, system: System) -> Self:
         """Fusion of a system that differs from this one only in its inputs."""
         fusion = copy(self)
         if not self.obstacle:
@@ -273,7 +273,7 @@ class Fusion:
             fuse_structure = {
                 "implicit": self.fused_implicit, "linear": self.fused_linear,
                 "inverse": self.fused_inverse,
-            }.get(purpose, self.fused)  # fmt: skip
+            }.get(purpose, self.structure_ir)  # fmt: skip
             fused_ir = fuse_structure(self.structure)
         return fused_sources(fused_ir, key, part)
 
@@ -324,7 +324,7 @@ class Fusion:
 
         return self.columns(self.structure, kernels, "solution", build)
 
-    def fused(self, structure: Structure) -> FusedSceneIR:
+    def structure_ir(self, structure: Structure) -> FusedSceneIR:
         """IR of a structure with the elements of this scene; no compiler, no cache."""
         from ..derive.fuse.scene_kernels import fuse
 

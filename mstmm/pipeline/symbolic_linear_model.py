@@ -61,20 +61,33 @@ def symbolic_linear_model(
     writer = SympyWriter()
     symbols = {name: writer.symbol(equations.symbols[name]) for name in keep}
     m, c, k = map(writer.matrix, equations.counted(equations.second_order()))
-    input_matrices = [equations.pushed(channels) for channels in (linear.controls, linear.others)]
+    input_matrices = [
+        equations.pushed(channels)
+        for channels in (linear.input_channels, linear.disturbance_channels)
+    ]
     v, w = map(writer.matrix, equations.counted(input_matrices))
     numbers = {
         symbols[name]: kept_formula.value for name, kept_formula in equations.symbols.items()
     }
     return SymbolicLinearModel(
-        m, c, k, v, w, symbols, numbers, linear.coordinates, linear.inputs, linear.disturbances
+        m,
+        c,
+        k,
+        v,
+        w,
+        symbols,
+        numbers,
+        linear.coordinate_names,
+        linear.input_names,
+        linear.disturbance_names,
     )
 
 
 def _require_symbolic(linear: LinearEquations) -> None:
-    if linear.drives:
+    if linear.drive_indices:
         raise SceneError(
-            f"symbolic: the motion of the drive of {linear.driven[0]} is an input, for which there "
+            f"symbolic: the motion of the drive of {linear.prescribed_coordinates[0]} is an "
+            f"input, for which there "
             "is no symbolic column; remove it from the inputs"
         )
     if len(linear) > MAX_COORDINATES:
@@ -82,8 +95,8 @@ def _require_symbolic(linear: LinearEquations) -> None:
             f"symbolic: the scene has {len(linear)} coordinates; the limit is {MAX_COORDINATES}; "
             "use M, C and K of linearize, after with_parameters for other values"
         )
-    if linear.model.packed.releases:
-        names = ", ".join(f'"{name}"' for name in linear.model.packed.releases)
+    if linear.model.packed_scene.releases:
+        names = ", ".join(f'"{name}"' for name in linear.model.packed_scene.releases)
         raise SceneError(
             f"symbolic: hinge {names} is released during the run, which changes the form of the "
             "equations; remove the release"
@@ -101,7 +114,7 @@ class _FormulaEquations:
         #: Contribution of a unit of each disturbance input to R, filled in by `second_order`.
         self._inputs: dict[int, list[Formula]] = {
             channel.input: []
-            for channel in (*linear.controls, *linear.others)
+            for channel in (*linear.input_channels, *linear.disturbance_channels)
             if channel.input >= 0
         }
         values = model.parameters
@@ -140,25 +153,27 @@ class _FormulaEquations:
             for i in self._inputs
             if NUMBERS_PER_PIECE * i + 1 in indices
         }
-        kernel = fuse_linear(structure, self._kernels, linear.free, list(used_inputs.values()))
+        kernel = fuse_linear(
+            structure, self._kernels, linear.free_speed_indices, list(used_inputs.values())
+        )
         outputs = self._run(kernel, p, self._u, self._accelerations())
         self._inputs |= {
             entry: outputs["P"][k :: len(used_inputs)] for k, entry in enumerate(used_inputs)
         }
         m, c, k = (_rows(outputs[name], len(linear)) for name in "MCK")
-        if linear.turning is None:
+        if linear.rate_matrix is None:
             return m, c, k
         if not all(x.fixed for x in outputs["N"]):
             raise SceneError(
                 "symbolic: kept numbers affect the relation of coordinates and speeds of a hinge; "
                 "linearize at rest, or leave them numbers"
             )
-        g = [[formula(x) for x in row] for row in linear.turning.tolist()]
+        g = [[formula(x) for x in row] for row in linear.rate_matrix.tolist()]
         return m, _subtract_product(c, m, g), _subtract_product(k, c, g)
 
     def _entry(self, push: Channel, symbol: Formula, required: list[Formula], row: int) -> Formula:
         """Effort on a free speed per unit of a disturbance or input."""
-        speed = self._linear.free[row]
+        speed = self._linear.free_speed_indices[row]
         if push.input >= 0:
             column = self._inputs[push.input]
             return -column[row] if column else formula(0.0)
@@ -170,15 +185,15 @@ class _FormulaEquations:
     def _accelerations(self) -> list[Formula]:
         linear = self._linear
         scale = np.abs(np.linalg.solve(linear.M, np.hstack([linear.K, linear.C]))).max(initial=0)
-        is_zero = np.abs(linear.state.a) <= _MAX_ZERO_ACCELERATION * scale
-        return [formula(x) for x in np.where(is_zero, 0.0, linear.state.a).tolist()]
+        is_zero = np.abs(linear.state.udot) <= _MAX_ZERO_ACCELERATION * scale
+        return [formula(x) for x in np.where(is_zero, 0.0, linear.state.udot).tolist()]
 
     def pushed(self, pushes: Sequence[Channel]) -> Rows:
         """Input matrix V or W, from the efforts of the tree at rest under a symbol per input.
 
         The efforts are proportional to the symbols.
         """
-        n = len(self._linear.free)
+        n = len(self._linear.free_speed_indices)
         if not pushes:
             return [[] for _ in range(n)]
         symbols = [self._book.symbol(channel.name, 1.0) for channel in pushes]

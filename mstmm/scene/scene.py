@@ -103,7 +103,7 @@ class Scene(SceneTables, NotebookDisplay):
         """Convert to TOML text with all defaults; loading it gives an equal scene."""
         return to_toml(self)
 
-    def check_against(self, spec: ElementSpec, where: str = "scene") -> None:
+    def check_type(self, spec: ElementSpec, where: str = "scene") -> None:
         """Check every element of a user-defined type against its definition.
 
         Raises SceneError; `where` begins every message.

@@ -96,11 +96,11 @@ class AdviceState:
         setting = Setting(AUTO, "one-way", initial_rtol(self.asked.error))
         try:
             model = self.compile(with_model_level(scene, "one-way"))
-            return runs.simulate(model, setting, _ONE_WAY_BUDGET * self.budget.left())[0]
+            return runs.simulate(model, setting, _ONE_WAY_BUDGET * self.budget.remaining())[0]
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
 
-    def known(
+    def evidence(
         self, one_way: Result | None, richest: Model
     ) -> tuple[dict[str, ErrorPrediction], str]:
         """Error estimates by body from a run with one-way coupling, and why there are none, or "".
@@ -108,10 +108,10 @@ class AdviceState:
         Without such a run, they come from a run of the richest model.
         """
         evidence, reason = predict_errors(one_way, self.length)
-        if evidence or not richest.flexible:
+        if evidence or not richest.flexible_bodies:
             return evidence, reason
         setting = Setting(AUTO, RICHEST, self.bench.rtol)
-        limit = _ONE_WAY_BUDGET * self.budget.left()
+        limit = _ONE_WAY_BUDGET * self.budget.remaining()
         try:
             result, _ = self.bench.runs.simulate(richest, setting, limit)
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError) as problem:
@@ -126,7 +126,7 @@ class AdviceState:
         return 1.0 if self.measure.unit == "m" else self.size / self.length
 
     @property
-    def enough(self) -> float:
+    def error_budget(self) -> float:
         """Largest sufficient error of a model relative to the reference."""
         return _MODEL_ERROR * self.beside_unseen
 
@@ -162,5 +162,5 @@ def motion_size(measure: Measure, result: Result | None) -> float:
     numbers = measure.read(result)
     measure.scale_by(numbers)
     start = np.broadcast_to(numbers[:1], numbers.shape)
-    distance = float(measure.apart(numbers, start).max(initial=0.0))
+    distance = float(measure.distance(numbers, start).max(initial=0.0))
     return distance if np.isfinite(distance) and distance > 0 else 1.0

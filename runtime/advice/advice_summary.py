@@ -65,16 +65,17 @@ def build_advice(
     assert error is not None and selected.point.cpu_s is not None
     return Advice(
         request.error, state.measure.name, state.measure.unit, state.measure.scaling, request.t_end,
-        _comparison_text(state, selected), bench.span.whole, max(bench.floor, state.unseen), bodies,
-        changes, selected.point.setting, error * growth + state.unseen, selected.point.cpu_s,
-        model_saving, setting_saving,
+        _comparison_text(state, selected), bench.span.is_whole_run, max(bench.floor, state.unseen),
+        bodies, changes, selected.point.setting, error * growth + state.unseen,
+        selected.point.cpu_s, model_saving, setting_saving,
         with_available_outputs(selected.tried.scene, state.compile),
-        dict(state.measure.names_in(selected.tried.running)), dict(state.parts),
-        tuple(state.notes),
+        dict(state.measure.names_in(selected.tried.running)), dict(state.parts), tuple(state.notes),
         tuple(
             TriedModel(
-                tried.name, tried.error if math.isfinite(tried.error) else None, tried.cpu_s,
-                tried.why,
+                tried.name,
+                tried.error if math.isfinite(tried.error) else None,
+                tried.cpu_s,
+                tried.reason,
             )
             for tried in bench.all
             if math.isfinite(tried.cpu_s)
@@ -87,15 +88,15 @@ def _given_scene_if_better(
 ) -> SelectedSetting | None:
     """Setting of the given scene if the reduced model is slower and less accurate, else None."""
     bench, setting = state.bench, selected.point.setting
-    scene = bench.tried(AS_GIVEN, state.scene, {})
+    scene = bench.run_trial(AS_GIVEN, state.scene, {})
     if saving is None or saving >= 1 or scene.model is None:
         return None
-    if scene.error >= selected.tried.error or scene.error > state.enough:
+    if scene.error >= selected.tried.error or scene.error > state.error_budget:
         return None
     if selected.whole:
         given = whole_run_tolerance(scene, state, state.beside_unseen - scene.error)
     else:
-        trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.left())
+        trial = bench.runs.trial(scene.model, setting, bench.measure, bench.budget.remaining())
         error = max_error(trial, bench.reference, bench.measure)
         if isinstance(error, str) or error * bench.span.growth > state.beside_unseen:
             return None
@@ -144,10 +145,10 @@ def _body_advice(
     richest_choices = state.bodies.richest
     is_richest = choice == richest_choices.get(name, choice)
     error, saving = (state.bench.floor, 1.0) if is_richest else (None, None)
-    if not is_richest and state.budget.left():
-        single = search.tried({**richest_choices, name: choice})
+    if not is_richest and state.budget.remaining():
+        single = search.try_choices({**richest_choices, name: choice})
         if math.isfinite(single.error):
-            richest_model = search.tried(richest_choices)
+            richest_model = search.try_choices(richest_choices)
             error, saving = single.error, richest_model.cpu_s / single.cpu_s
     split = None
     if prediction is not None and state.steep(prediction) and name not in state.parts:
@@ -194,7 +195,7 @@ def _savings(state: AdviceState, selected: SelectedSetting) -> tuple[float | Non
     rtol = RTOL if setting.fixed else setting.value
     same_setting = Setting(AUTO, tried.name, rtol)
     default_setting = Setting(METHOD, tried.name, RTOL)
-    given = state.bench.tried(AS_GIVEN, state.scene, {})
+    given = state.bench.run_trial(AS_GIVEN, state.scene, {})
     savings: list[float | None] = []
     for model, before, after in (
         (given, same_setting, same_setting), (tried, default_setting, setting),

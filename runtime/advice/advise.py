@@ -71,7 +71,7 @@ def make_advice(
     state.size = motion_size(state.measure, one_way)
     predictions = predict_errors(one_way, state.length)[0]
     state.bench, base = _make_runner(state, top, richest, predictions, report_status)
-    evidence, reason = state.known(one_way, richest)
+    evidence, reason = state.evidence(one_way, richest)
     if reason:
         state.notes.append(f"no error estimates for the flexible bodies: {reason}")
     base = reduce_to_plane(state, top, richest, base)
@@ -96,17 +96,17 @@ def _make_runner(
     request = state.asked
     rtol = initial_rtol(state.part)
     span = choose_window(model, request.t_end, request.samples, state.budget, state.measure, rtol)
-    if not span.whole:
+    if not span.is_whole_run:
         rise = max((prediction.rise(span.t_end) for prediction in evidence.values()), default=1.0)
         span = replace(span, rise=min(rise, _MAX_RISE))
     runner = TrialRunner(
         span, request.samples, state.budget, state.measure, state.compile, state.tell
     )
-    richest = runner.refer_to(top.scene, model, RICHEST, request.error, state.part)
+    richest = runner.make_reference(top.scene, model, RICHEST, request.error, state.part)
     report_status(
         f"models are compared over {span}; error of the reference about {richest.error:.1e}"
     )
-    if not span.whole:
+    if not span.is_whole_run:
         state.notes.append(
             "motion after the window was not simulated: plane, hinges, springs and dampers stay as "
             "they are; give a larger --budget to have them examined"
@@ -120,8 +120,8 @@ def _reduce_bodies(
     """Advice for a scene whose plane, beams and rigid hinges have been decided."""
     state.bodies = Bodies(base.scene)
     search = ModelSearch(
-        state.bodies, state.bench, evidence, state.enough, state.in_measure,
-        lambda: state.budget.left(SEARCH) > 0,
+        state.bodies, state.bench, evidence, state.error_budget, state.in_measure,
+        lambda: state.budget.remaining(SEARCH) > 0,
     )  # fmt: skip
     for name in (RICHEST, base.name):
         search.made[name] = state.bodies.richest
@@ -149,7 +149,7 @@ def _select_setting(
     """
     available = state.beside_unseen
     if best.error > _ACCURATE * available and choices != state.bodies.richest:
-        search.tried(search.richer(choices))
+        search.try_choices(search.richer(choices))
     others = sorted(
         (
             tried
@@ -159,7 +159,7 @@ def _select_setting(
         ),
         key=lambda tried: tried.cpu_s,
     )
-    if not state.bench.span.whole:
+    if not state.bench.span.is_whole_run:
         selected = whole_run_tolerance(best, state, _TOTAL_ERROR * available - best.error)
         if selected is not None:
             return selected
@@ -168,7 +168,7 @@ def _select_setting(
             "extrapolated"
         )
     finalists = [best, *others][:_MAX_FINALISTS]
-    seconds = max(_METHOD_BUDGET * state.asked.budget, state.budget.left())
+    seconds = max(_METHOD_BUDGET * state.asked.budget, state.budget.remaining())
     max_error, growth = _TOTAL_ERROR * available, state.bench.span.growth
     try:
         return cheapest_setting(
@@ -182,4 +182,4 @@ def _select_setting(
 def _may_be_cheapest(state: AdviceState, tried: TrialResult, best: TrialResult) -> bool:
     is_accurate = tried.error <= _ACCURATE * state.asked.error
     factor = _ACCURATE_TIME_FACTOR if is_accurate else _TIME_FACTOR
-    return tried.error <= state.enough and tried.cpu_s <= factor * best.cpu_s
+    return tried.error <= state.error_budget and tried.cpu_s <= factor * best.cpu_s

@@ -73,7 +73,7 @@ def _prepare_splitting(
     if not changes:
         return scene, state.bench.finer(scene, state.bench.names, base.name), ()
     run = state.bench.finer(scene, state.bench.names, "splittable beams")
-    error = math.inf if run.numbers is None else state.bench.apart(state.bench.reference, run)
+    error = math.inf if run.numbers is None else state.bench.distance(state.bench.reference, run)
     if error <= _PREPARATION_ERROR * state.asked.error:
         state.unseen = error
         sentences = (
@@ -119,7 +119,7 @@ def _refine_parts(
         if finer.numbers is None:
             state.notes.append(f"beams in {count} parts could not be simulated: {finer.failure}")
             break
-        change = state.bench.apart(run, finer)
+        change = state.bench.distance(run, finer)
         if change <= _MAX_CHANGE * state.asked.error:
             return split, finer, change
         split, run = parts, finer
@@ -139,9 +139,9 @@ def _compare_with_parts(
     """
     state.parts = split.parts
     state.whole = {**Bodies(split.scene).richest, **state.whole}
-    single_frame_error = state.bench.apart(state.bench.reference, reference)
+    single_frame_error = state.bench.distance(state.bench.reference, reference)
     state.bench.refer_again(reference, split.names)
-    tried = state.bench.tried("beams in parts", split.scene)
+    tried = state.bench.run_trial("beams in parts", split.scene)
     parts_by_beam: dict[str, list[str]] = {}
     for part, beam in split.parts.items():
         parts_by_beam.setdefault(beam, []).append(part)
@@ -150,7 +150,7 @@ def _compare_with_parts(
         f"one frame its error is {single_frame_error:.1e}" + _renamed_ends(beam, split.names)
         for beam, parts in parts_by_beam.items()
     ))  # fmt: skip
-    evidence, reason = state.known(state.least(split.scene), tried.running)
+    evidence, reason = state.evidence(state.least(split.scene), tried.running)
     if reason:
         state.notes.append(f"no error estimates for the parts of beams: {reason}")
     return tried, evidence

@@ -105,10 +105,10 @@ def body_predictions(result: Result, reach: float) -> dict[str, ErrorPrediction]
     Raises NumericalFailure if the elastic response cannot be computed.
     """
     model = result.model
-    bodies: Mapping[str, ModalBody] = model.flexible
+    bodies: Mapping[str, ModalBody] = model.flexible_bodies
     if isinstance(result, OneWayResult):
         bodies = rigidified_bodies(model).one_way
-    ranges = {model_range.name: model_range for model_range in result.certificate.flexible}
+    ranges = {model_range.name: model_range for model_range in result.certificate.flexible_bodies}
     predictions = {}
     for name, body in bodies.items():
         if name in ranges:
@@ -122,7 +122,7 @@ def _modal_coordinates(result: Result, name: str) -> Array:
     """(n, modes) modal coordinates."""
     if isinstance(result, OneWayResult):
         return np.asarray(result.response(name).eta)
-    return result.q[:, result.model.layout.modal[name].q_slice]
+    return result.q[:, result.model.coordinate_layout.modal[name].q_slice]
 
 
 def _loaded_ends(model: CompiledScene, name: str) -> set[str]:

@@ -37,15 +37,17 @@ def whole_run_tolerance(
     None if none is found in time.
     """
     span, measure = state.bench.span, state.measure
-    budget = Budget(max(_MIN_BUDGET * state.asked.budget, state.budget.left()), state.budget.clock)
+    budget = Budget(
+        max(_MIN_BUDGET * state.asked.budget, state.budget.remaining()), state.budget.clock
+    )
     times = np.linspace(0.0, span.wanted, state.asked.samples)
     runs = Runs(span.wanted, times, budget)
     rtol = min(max(_FIRST * state.part, _TIGHTEST / _VERIFICATION_RATIO), 1e-3)
     for _ in range(_MAX_TRIALS):
         setting = Setting(AUTO, best.name, rtol)
         tighter = Setting(AUTO, best.name, rtol * _VERIFICATION_RATIO)
-        trial = runs.trial(best.running, setting, measure, budget.left() / 3)
-        verification = runs.trial(best.running, tighter, measure, budget.left() / 2)
+        trial = runs.trial(best.running, setting, measure, budget.remaining() / 3)
+        verification = runs.trial(best.running, tighter, measure, budget.remaining() / 2)
         if trial.numbers is None or verification.numbers is None:
             return None
         error = max_error(trial, verification, measure)

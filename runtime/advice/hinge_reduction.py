@@ -109,9 +109,9 @@ def rigid_hinge_changes(scene: Scene, model: CompiledScene, q: Array, reach: flo
             continue
         if simulated is None or simulated.type != hinge.type:
             continue
-        if hinge.drive is not None or hinge.lets_go or name in released:
+        if hinge.drive is not None or hinge.is_released or name in released:
             continue
-        hinge_q = q[:, model.layout.hinges[name].q_slice]
+        hinge_q = q[:, model.coordinate_layout.hinges[name].q_slice]
         change = None
         if properties.quaternion is not None:
             change = _rigid_at_reference_position(hinge, hinge_q, reach)

@@ -63,9 +63,9 @@ class Renaming(Measure):
         _, names, still = self._renamings[id(result.model)]
         return self.inner.read(cast("Record", _RenamedRecord(result, names, still)))
 
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         """Distances (n,) between two sets of measured values."""
-        return self.inner.apart(a, b)
+        return self.inner.distance(a, b)
 
     def scale_by(self, numbers: Array) -> None:
         """Scale relative errors by the measured values of the reference."""

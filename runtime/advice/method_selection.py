@@ -78,7 +78,7 @@ def cheapest_setting(
     sufficient = [
         i
         for i, point in enumerate(points)
-        if point.sure_error is not None and point.sure_error <= target_error
+        if point.error_bound is not None and point.error_bound <= target_error
     ]
     if not sufficient:
         raise NumericalFailure(f"no setting reaches an error of {target_error:.1e}")
@@ -104,10 +104,10 @@ def _setting_for_error(
     """Setting that `simulate` selects for an integration error; None if it fails."""
     try:
         options = {"error": error, "error_of": of}
-        result, _ = runs.called(tried.running, options, runs.budget.share(ALL))
+        result, _ = runs.simulate_with(tried.running, options, runs.budget.share(ALL))
     except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
         return None
-    estimate = result.error_estimate
+    estimate = result.achieved_error
     if estimate is None or not result.is_comparable:
         return None
     return Setting(estimate.method, tried.name, estimate.rtol)
@@ -124,7 +124,7 @@ def compare_cpu_times(
     """CPU times of two runs in alternating rounds, s; None if one fails or takes too long."""
     points, models = [], [a.running, b.running]
     for model, model_setting in zip(models, (setting, other), strict=True):
-        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.left() / 2)
+        trial = bench.runs.trial(model, model_setting, bench.measure, bench.budget.remaining() / 2)
         if trial.numbers is None:
             return None
         points.append(Point(model_setting, 0.0, trial.cpu_s, 1))

@@ -36,12 +36,12 @@ def reduce_to_plane(
     state: AdviceState, top: Variant, model: Model, richest: TrialResult
 ) -> TrialResult:
     """The planar form of the richest scene, if its motion is the same; else the scene."""
-    if not state.bench.span.whole:
+    if not state.bench.span.is_whole_run:
         return richest
     planar = planar_level(top, model, state.bench.reference.q)
     if planar is None:
         return richest
-    tried = state.bench.tried("planar", planar.scene)
+    tried = state.bench.run_trial("planar", planar.scene)
     if tried.error > max(_PLANAR_ERROR * state.asked.error, 3 * state.bench.floor):
         return richest
     hinges = [
@@ -66,7 +66,7 @@ def reduce_by_halves(
     All changes are tried together, then by halves, down to the parts of single changes.  `word`
     describes the changes in names of models.
     """
-    if not state.bench.span.whole:
+    if not state.bench.span.is_whole_run:
         return base
     names = state.measure.names_in(base.running)
     kept: list[Change] = []
@@ -74,15 +74,15 @@ def reduce_by_halves(
     limit = _MAX_ESTIMATE * max_error
     waiting = [[change for change in changes if change.expected * state.in_measure <= limit]]
     sentences = state.told[base.name]
-    while waiting and state.budget.left(SEARCH):
+    while waiting and state.budget.remaining(SEARCH):
         group = waiting.pop()
         if not group:
             continue
         changed = apply_changes(base.scene, [*kept, *group])
         changed_names = ", ".join(change.name for change in (*kept, *group))
         name = f"{base.name}; {word}: {changed_names}"
-        tried = state.bench.tried(name, changed.scene, compose_names(names, changed.names))
-        if tried.error <= max_error and (not cheap or state.bench.as_cheap(tried, best)):
+        tried = state.bench.run_trial(name, changed.scene, compose_names(names, changed.names))
+        if tried.error <= max_error and (not cheap or state.bench.is_as_cheap(tried, best)):
             kept, best, chain_sentences = [*kept, *group], tried, changed.words
         elif len(group) > 1:
             half = len(group) // 2
@@ -102,10 +102,10 @@ def _single_change_text(
     state: AdviceState, base: TrialResult, word: str, change: Change, names: Mapping[str, str]
 ) -> str:
     """Description of a change, with its effect alone if there is time for a run."""
-    if not state.budget.left(SEARCH):
+    if not state.budget.remaining(SEARCH):
         return str(change)
     changed = apply_changes(base.scene, [change])
-    tried = state.bench.tried(
+    tried = state.bench.run_trial(
         f"{base.name}; {word}: {change.name}", changed.scene, compose_names(names, changed.names)
     )
     return _measured_text(f"{change}; this change alone", tried, base)
@@ -114,7 +114,7 @@ def _single_change_text(
 def _measured_text(description: str, tried: TrialResult, before: TrialResult) -> str:
     """Error of a model, and its CPU time relative to the model before a change."""
     if not math.isfinite(tried.error):
-        return f"{description}: fails ({tried.why})"
+        return f"{description}: fails ({tried.reason})"
     ratio = tried.cpu_s / before.cpu_s
     return f"{description}: error {tried.error:.1e}, {ratio:.2f} of the time before"
 
@@ -134,7 +134,7 @@ def merge_welded(state: AdviceState, base: TrialResult, max_error: float) -> Tri
         names = compose_names(names_now, merged.names)
         still = dict(merged.still)
         still |= {old: still[new] for old, new in names_now.items() if new in still}
-        tried = state.bench.tried(name, merged.scene, names, still)
+        tried = state.bench.run_trial(name, merged.scene, names, still)
         if tried.error <= max_error:
             effect = _measured_text("with welded bodies merged", tried, base)
             state.told[name] = (*state.told[base.name], *merged.words, effect)

@@ -61,16 +61,16 @@ class ModelSearch:
         choices, tried = self._enlarge()
         return self._reduce(choices, tried)
 
-    def expected(self, name: str, choice: BodyModel) -> float | None:
+    def expected_error(self, name: str, choice: BodyModel) -> float | None:
         """Estimated error of a model of one body; None without estimate."""
         prediction = self.evidence.get(name)
         return None if prediction is None else prediction.error(choice) * self.in_measure
 
-    def tried(self, choices: Mapping[str, BodyModel]) -> TrialResult:
+    def try_choices(self, choices: Mapping[str, BodyModel]) -> TrialResult:
         """Trial of the scene with these models of its bodies."""
         name = self.name(choices)
         self.made[name] = dict(choices)
-        return self.bench.tried(name, self.bodies.scene_of(choices))
+        return self.bench.run_trial(name, self.bodies.scene_of(choices))
 
     def name(self, choices: Mapping[str, BodyModel]) -> str:
         """Description of the scene; bodies with the same model are listed together."""
@@ -87,19 +87,19 @@ class ModelSearch:
         """Make bodies richer until the scene suffices."""
         choices = {name: self._initial_choice(name) for name in self.bodies.richest}
         while True:
-            tried = self.tried(choices)
+            tried = self.try_choices(choices)
             if tried.error <= self.enough or choices == self.bodies.richest:
                 return choices, tried
             if not self._has_time():
                 self.skipped = list(choices)
-                return dict(self.bodies.richest), self.tried(self.bodies.richest)
+                return dict(self.bodies.richest), self.try_choices(self.bodies.richest)
             choices = self.richer(choices)
 
     def _initial_choice(self, name: str) -> BodyModel:
         """The smallest model that is expected to suffice."""
         limit = _SUFFICIENT * self.enough / len(self.bodies.richest)
         for choice in self._choices_upward(name):
-            estimate = self.expected(name, choice)
+            estimate = self.expected_error(name, choice)
             if estimate is not None and estimate <= limit and self._is_valid(name, choice):
                 return choice
         return self.bodies.richest[name]
@@ -153,7 +153,7 @@ class ModelSearch:
     def richer(self, choices: Choices) -> Choices:
         """Choices with richer models of the bodies with the largest estimated errors."""
         candidates = {name for name in choices if choices[name] != self.bodies.richest[name]}
-        estimates = {name: self.expected(name, choices[name]) for name in candidates}
+        estimates = {name: self.expected_error(name, choices[name]) for name in candidates}
         errors = {name: math.inf if error is None else error for name, error in estimates.items()}
         max_error = max(errors.values())
         richer = dict(choices)
@@ -165,9 +165,9 @@ class ModelSearch:
     def _next_choice(self, name: str, choice: BodyModel) -> BodyModel:
         """The next model with a smaller estimated error; the richest if there is none."""
         models = list(self._choices_upward(name))
-        current = self.expected(name, choice)
+        current = self.expected_error(name, choice)
         for model in models[models.index(choice) + 1 :] if choice in models else ():
-            estimate = self.expected(name, model)
+            estimate = self.expected_error(name, model)
             is_smaller = estimate is None or current is None or estimate < _SUFFICIENT * current
             if is_smaller and self._is_valid(name, model):
                 return model
@@ -189,15 +189,15 @@ class ModelSearch:
                         self.skipped = self.skipped or order[k:]
                         return choices, best
                     smaller = {**choices, name: choice}
-                    tried = self.tried(smaller)
-                    if tried.error <= self.enough and self.bench.as_cheap(tried, best):
+                    tried = self.try_choices(smaller)
+                    if tried.error <= self.enough and self.bench.is_as_cheap(tried, best):
                         choices, best, is_reduced = smaller, tried, True
                         break
                     self.failed.add((name, choice))
         return choices, best
 
     def _is_promising(self, name: str, choice: BodyModel) -> bool:
-        estimate = self.expected(name, choice)
+        estimate = self.expected_error(name, choice)
         factor = _MAX_ONE_WAY_ESTIMATE if choice.level == ONE_WAY else _MAX_ESTIMATE
         return estimate is None or estimate <= factor * self.enough
 

@@ -63,7 +63,7 @@ class ComparisonWindow:
     rise: float = 1.0
 
     @property
-    def whole(self) -> bool:
+    def is_whole_run(self) -> bool:
         """Whether the whole run is compared."""
         return self.t_end >= self.wanted
 
@@ -73,7 +73,7 @@ class ComparisonWindow:
         return self.wanted / self.t_end * self.rise
 
     def __str__(self) -> str:
-        if self.whole:
+        if self.is_whole_run:
             return f"the whole run of {self.wanted:g} s"
         return f"the first {self.t_end:.3g} s of {self.wanted:g} s, errors times {self.growth:.3g}"
 
@@ -88,7 +88,7 @@ class TrialResult:
         model: compiled model; None if it could not be compiled or its run failed.
         error: error relative to the richest model, over the whole run; inf if it failed.
         cpu_s: CPU time of the run, s.
-        why: reason of the failure, else "".
+        reason: reason of the failure, else "".
     """
 
     name: str
@@ -96,7 +96,7 @@ class TrialResult:
     model: Model | None
     error: float
     cpu_s: float
-    why: str = ""
+    reason: str = ""
 
     @property
     def running(self) -> Model:
@@ -112,7 +112,7 @@ def choose_window(model: Model, t_end: float, samples: int, budget: Budget, meas
     Raises NumericalFailure if the model cannot be simulated.
     """
     runs = Runs(_PROBE_FRACTION * t_end, np.linspace(0.0, _PROBE_FRACTION * t_end, samples), budget)
-    limit = budget.left() * _REFERENCE_BUDGET
+    limit = budget.remaining() * _REFERENCE_BUDGET
     begin = budget.clock()
     trial = runs.trial(model, Setting(AUTO, "", rtol), measure, limit)
     spent = max(budget.clock() - begin, 1e-9)
@@ -124,9 +124,9 @@ def choose_window(model: Model, t_end: float, samples: int, budget: Budget, meas
     if trial.numbers is None:
         raise NumericalFailure(trial.failure)
     cost = 3.0 * spent / _PROBE_FRACTION  # two runs, one of them tighter
-    if cost <= _REFERENCE_BUDGET * budget.left():
+    if cost <= _REFERENCE_BUDGET * budget.remaining():
         return ComparisonWindow(t_end, t_end)
-    fraction = _WINDOW_BUDGET * budget.left() / cost
+    fraction = _WINDOW_BUDGET * budget.remaining() / cost
     return ComparisonWindow(max(min(fraction, 1.0), _PROBE_FRACTION) * t_end, t_end)
 
 
@@ -166,7 +166,7 @@ class TrialRunner:
         self.late: list[str] = []
         self._results: dict[str, TrialResult] = {}
 
-    def refer_to(
+    def make_reference(
         self, scene: Scene, model: Model, name: str, asked: float, part: float
     ) -> TrialResult:
         """Run the richest model with tighter tolerances until two runs agree.
@@ -180,7 +180,7 @@ class TrialRunner:
             tighter_rtol = max(self.rtol * _REFERENCE_RATIO, _TIGHTEST)
             tighter = self._run_richest(model, name, tighter_rtol)
             self.measure.scale_by(_measured_values(tighter))
-            difference = self.apart(run, tighter)
+            difference = self.distance(run, tighter)
             if difference <= _MAX_DIFFERENCE * asked:
                 break
             if tighter_rtol <= _TIGHTEST:
@@ -203,10 +203,10 @@ class TrialRunner:
         self.tell(name)
         model = self.compile(scene)
         self.measure.know(model, names)
-        limit = self.budget.left() * _MODEL_BUDGET
+        limit = self.budget.remaining() * _MODEL_BUDGET
         return self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
 
-    def apart(self, a: Trial, b: Trial) -> float:
+    def distance(self, a: Trial, b: Trial) -> float:
         """Difference of two runs, extrapolated to the whole run; inf if unknown."""
         error = max_error(a, b, self.measure)
         return math.inf if isinstance(error, str) else error * self.span.growth
@@ -217,7 +217,7 @@ class TrialRunner:
         self.measure.scale_by(_measured_values(trial))
         self._results.clear()
 
-    def tried(
+    def run_trial(
         self, name: str, scene: Scene, names: Mapping[str, str] | None = None,
         still: Mapping[str, Vector] | None = None,
     ) -> TrialResult:  # fmt: skip
@@ -245,7 +245,7 @@ class TrialRunner:
             self.measure.know(model, self.names if names is None else names, still)
         except MstmmError as problem:
             return TrialResult(name, scene, None, math.inf, math.inf, str(problem))
-        limit = self.budget.left() * _MODEL_BUDGET
+        limit = self.budget.remaining() * _MODEL_BUDGET
         trial = self.runs.trial(model, Setting(AUTO, name, self.rtol), self.measure, limit)
         if trial.late:
             self.late.append(name)
@@ -267,12 +267,12 @@ class TrialRunner:
         times = [trial.cpu_s]
         if trial.cpu_s < _SHORT:
             times += [
-                self.runs.simulate(model, trial.setting, self.budget.left())[1]
+                self.runs.simulate(model, trial.setting, self.budget.remaining())[1]
                 for _ in range(_REPEATS - 1)
             ]
         return min(times)
 
-    def as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
+    def is_as_cheap(self, one: TrialResult, other: TrialResult) -> bool:
         """Whether a model is not slower than another, within the scatter of timings.
 
         If it seems slower, both are timed again in turn: other processes may have delayed it.
@@ -284,7 +284,7 @@ class TrialRunner:
             for k, tried in enumerate(pair):
                 setting = Setting(AUTO, tried.name, self.rtol)
                 try:
-                    spent = self.runs.simulate(tried.running, setting, self.budget.left())[1]
+                    spent = self.runs.simulate(tried.running, setting, self.budget.remaining())[1]
                 except OutOfTime:
                     return False
                 times[k] = min(times[k], spent)
@@ -292,7 +292,7 @@ class TrialRunner:
 
     def _run_richest(self, model: Model, name: str, rtol: float) -> Trial:
         """Run the richest model; NumericalFailure if the run fails."""
-        limit = self.budget.left() * 2 * _REFERENCE_BUDGET
+        limit = self.budget.remaining() * 2 * _REFERENCE_BUDGET
         self.tell(f"{name}, rtol {rtol:.0e}")
         trial = self.runs.trial(model, Setting(AUTO, name, rtol), self.measure, limit)
         if trial.numbers is None:

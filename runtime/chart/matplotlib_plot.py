@@ -80,8 +80,8 @@ def _draw_axes(axes: Any, drawing: Drawing) -> None:
             drawing.floor, 0.985, " not resolved by the reference", fontsize=7, color="#777777",
             va="top", ha="left", rotation=90, transform=axes.get_xaxis_transform(),
         )  # fmt: skip
-    if len(drawing.front) > 1:
-        axes.plot(*zip(*drawing.front, strict=True), color="#111111", lw=7, alpha=0.16,
+    if len(drawing.pareto_front) > 1:
+        axes.plot(*zip(*drawing.pareto_front, strict=True), color="#111111", lw=7, alpha=0.16,
                   solid_capstyle="round", solid_joinstyle="round", zorder=3)  # fmt: skip
     for line in drawing.lines:
         positions = [position for position, _ in line.points]
@@ -91,9 +91,16 @@ def _draw_axes(axes: Any, drawing: Drawing) -> None:
             ms=5 if line.strong else 3, mec="white", mew=0.5, alpha=1.0 if line.strong else 0.55,
             zorder=5 if line.strong else 2, clip_on=True,
         )  # fmt: skip
-    if drawing.front:
-        axes.plot(*zip(*drawing.front, strict=True), "o", ms=9, mfc="none", mec="#111111", mew=0.9,
-                  zorder=6)  # fmt: skip
+    if drawing.pareto_front:
+        axes.plot(
+            *zip(*drawing.pareto_front, strict=True),
+            "o",
+            ms=9,
+            mfc="none",
+            mec="#111111",
+            mew=0.9,
+            zorder=6,
+        )
     for label in drawing.labels:
         axes.annotate(
             label.text, label.place, (label.at[0], -label.at[1]), textcoords="offset points",

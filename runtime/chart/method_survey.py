@@ -49,7 +49,7 @@ class Curve:
     costs: list[float] = field(default_factory=list)
 
     @property
-    def expected(self) -> float:
+    def expected_seconds(self) -> float:
         """Estimated CPU time of the next setting, s; 0 if unknown."""
         if not self.costs:
             return 0.0
@@ -79,7 +79,7 @@ class SurveyResult:
 
     points: list[Point] = field(default_factory=list)
     models: list[Model] = field(default_factory=list)
-    left_out: list[Skipped] = field(default_factory=list)
+    skipped: list[Skipped] = field(default_factory=list)
 
 
 class Survey:
@@ -107,7 +107,7 @@ class Survey:
         setting = next(curve.ahead, None)
         if setting is None:
             return False
-        if not limit or curve.expected > limit:
+        if not limit or curve.expected_seconds > limit:
             self._skip(curve, f"{setting} and tighter", _NO_TIME)
             return False
         self.tell(f"{curve.level}: {curve.method}, {setting}")
@@ -137,7 +137,7 @@ class Survey:
         return True
 
     def _skip(self, curve: Curve, setting: str, reason: str, refused: bool = False) -> None:
-        self.found.left_out.append(Skipped(curve.method, curve.level, setting, reason, refused))
+        self.found.skipped.append(Skipped(curve.method, curve.level, setting, reason, refused))
 
 
 def _may_include_loading(trial: Trial, model: Model) -> bool:
@@ -156,5 +156,5 @@ def chart_point(trial: Trial, reference: Trial, measure: Measure) -> Point:
         trial.setting, error, trial.cpu_s, 1,
         None if counts is None else counts.evaluations, factorization_count(trial.setting, counts),
         None if counts is None else counts.steps,
-        warnings=trial.warnings, too_coarse=trial.too_coarse,
+        warnings=trial.warnings, is_too_coarse=trial.too_coarse,
     )  # fmt: skip

@@ -74,7 +74,7 @@ class Drawing:
     x: tuple[float, float]
     y: tuple[float, float]
     lines: list[Line]
-    front: list[Place]
+    pareto_front: list[Place]
     floor: float
     labels: list[Label]
     legend: list[Entry]
@@ -95,11 +95,11 @@ def build_drawing(chart: ChartRecord) -> Drawing:
         id(p): position for p in chart.points if (position := plot_position(p)) is not None
     }
     shown = [p for p in chart.points if id(p) in positions]
-    x, y = _limits(shown, positions, chart.reference.floor)
+    x, y = _limits(shown, positions, chart.reference.smallest_resolved_error)
     kept = [p for p in shown if positions[id(p)][0] <= x[0] + 1e-9]
-    levels = [level.name for level in chart.levels]
+    levels = [level.name for level in chart.model_levels]
     has_levels = len(levels) > 1
-    front = [p for p in chart.front if id(p) in positions and p in kept]
+    front = [p for p in chart.pareto_front if id(p) in positions and p in kept]
     lines = (
         _level_lines(kept, positions, levels, chart)
         if has_levels
@@ -111,16 +111,16 @@ def build_drawing(chart: ChartRecord) -> Drawing:
     reference = chart.reference
     unit = "" if reference.unit == "1" else f" in {reference.unit}"
     return Drawing(
-        x, y, lines, front_positions,
-        math.log10(reference.floor) if reference.floor > 0 else -math.inf,
-        _labels(front_positions, front_names, x, y), _legend(lines, chart.points, levels),
-        chart.title or "work-precision chart",
+        x, y, lines, front_positions, math.log10(reference.smallest_resolved_error)
+        if reference.smallest_resolved_error > 0
+        else -math.inf, _labels(front_positions, front_names, x, y),
+        _legend(lines, chart.points, levels), chart.title or "work-precision chart",
         _subtitle(chart),
         f"largest error of {reference.measure}{unit}" + ("" if unit else " (scaled)"),
         beyond=len(shown) - len(kept), empty=_empty_reason(chart, shown),
         own=[
             (math.log10(level.error), colours[level.name], level.name)
-            for level in chart.levels
+            for level in chart.model_levels
             if has_levels and level.error and level.name != reference.model
         ],
     )  # fmt: skip
@@ -129,7 +129,7 @@ def build_drawing(chart: ChartRecord) -> Drawing:
 def _subtitle(chart: ChartRecord) -> str:
     """Simulated time and reference of a chart."""
     reference = chart.reference
-    until = f", {reference.ended}" if reference.ended else ""
+    until = f", {reference.stop_event}" if reference.stop_event else ""
     return (
         f"{chart.t_end:g} s of motion{until}; reference: {reference.made_by}, its own error "
         f"{reference.error:.1e}"
@@ -140,7 +140,7 @@ def _empty_reason(chart: ChartRecord, shown: Sequence[Point]) -> str:
     """Reason why there is nothing to plot, "" if there is something."""
     if shown:
         return ""
-    if chart.reference.still:
+    if chart.reference.is_static:
         return "nothing moves in this scene"
     errors = [point.error for point in chart.points if point.error is not None]
     return "no run has an error above zero" if errors else "no run was completed"
@@ -195,7 +195,7 @@ def _level_lines(
 ) -> list[Line]:
     """Per model level: faint lines of its methods, and its own Pareto front as a strong line."""
     colours, lines = level_colours(levels), []
-    level_errors = {level.name: 1.1 * (level.error or 0.0) for level in chart.levels}
+    level_errors = {level.name: 1.1 * (level.error or 0.0) for level in chart.model_levels}
     level_errors[chart.reference.model] = 0.0
     for curve in dict.fromkeys(p.curve for p in points):
         path = tuple((positions[id(p)], p) for p in points if p.curve == curve)
@@ -203,7 +203,7 @@ def _level_lines(
     for strong in (False, True):
         for level in levels:
             level_points = [p for p in points if p.model == level]
-            floor = max(level_errors[level], chart.reference.floor)
+            floor = max(level_errors[level], chart.reference.smallest_resolved_error)
             front_ids = {id(p) for p in pareto_front(level_points, floor)}
             for mark in dict.fromkeys(family_mark(p.method) for p in level_points):
                 marked = tuple(

@@ -98,7 +98,9 @@ def _run_candidate(
     trials: list[Trial] = []
     for tolerance in tolerances:
         setting = Setting(method, name, tolerance)
-        limit = runs.budget.left(REFERENCE) / 2  # the other half leaves time for another method
+        limit = (
+            runs.budget.remaining(REFERENCE) / 2
+        )  # the other half leaves time for another method
         if trials and _GROWTH * trials[-1].cpu_s > limit:
             return trials, f"{setting} would take too long", True
         report(f"reference by {method}, {setting}")

@@ -48,10 +48,12 @@ def chart_svg(drawing: Drawing, keys: dict[str, int]) -> str:
         *_axes_svg(drawing, plane),
         '<g clip-path="url(#plane)">',
     ]
-    if len(drawing.front) > 1:
-        parts.append(f'<polyline class="front" points="{_path_points(plane, drawing.front)}"/>')
+    if len(drawing.pareto_front) > 1:
+        parts.append(
+            f'<polyline class="front" points="{_path_points(plane, drawing.pareto_front)}"/>'
+        )
     parts += [_line_svg(line, plane, keys[line.name]) for line in drawing.lines]
-    for position in drawing.front:
+    for position in drawing.pareto_front:
         x, y = plane.at(position)
         parts.append(f'<circle class="best" cx="{x:.1f}" cy="{y:.1f}" r="7.5"/>')
     for log_error, colour, name in drawing.own:

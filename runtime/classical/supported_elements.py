@@ -116,7 +116,7 @@ def _hinge_kind(
 
 def _rigid_kind(facts: HingeProperties | None) -> str | None:
     """Kind of a hinge by its free motions; None if there is no matrix."""
-    if facts is None or not facts.steady:
+    if facts is None or not facts.constant_subspace:
         return None
     if facts.welds:
         return FIXED

@@ -67,7 +67,7 @@ class ExpressionFunctions:
         inner_terms = {i for n in self.moving for i in terms[n].args}
         return sorted(self.moving - inner_terms)
 
-    def watched(self) -> list[WatchedFunction]:
+    def narrow_candidates(self) -> list[WatchedFunction]:
         """Functions that may have narrow features: all but sums, products and switches.
 
         For a drive, whose second derivative acts, their slopes are included.

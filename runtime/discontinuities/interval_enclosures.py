@@ -42,7 +42,7 @@ def terms_of_names(
 ) -> tuple[list[int], list[int]]:
     """Split terms as `terms_of_time` does, with the names `variables` instead of t."""
     closed_terms, varying_terms = set[int](), set[int]()
-    for index in sorted(expression.needed):
+    for index in sorted(expression.required_terms):
         term = expression.terms[index]
         if term.constant is not None or _is_known(term, constants):
             closed_terms.add(index)

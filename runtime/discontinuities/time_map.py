@@ -63,7 +63,7 @@ class TimeMap:
             f"the fixed step of {step:g} s is too long for {self.narrowest}, which near "
             f"t = {time:.6g} s requires steps of {shortest:.2g} s: features may be missed",
             f"use a step below {shortest:.2g} s, or omit step", step, shortest, "s",
-            before=True,
+            seen_before_run=True,
         )  # fmt: skip
 
 
@@ -150,7 +150,7 @@ def _map_expressions(
                     findings.append(_pole_risk(entry, pole_time))
             if not roots_found.complete:
                 findings.append(_switches_risk(entry, roots_found.open_from))
-        watched_functions = functions.watched()
+        watched_functions = functions.narrow_candidates()
         if watched_functions:
             limits.append(
                 (
@@ -187,7 +187,7 @@ def _pole_risk(one: ActiveExpression, t: float) -> Risk:
         f"s: unless "
         "its factor vanishes there, no motion passes",
         "end the run before that time, or limit the part, such as by min or max",
-        before=True,
+        seen_before_run=True,
     )
 
 
@@ -213,7 +213,7 @@ def _switches_risk(one: ActiveExpression, since: float) -> Risk:
         f"switching "
         f"time: from t = {since:.6g} s on some are missed",
         "give max_step, or a shorter run",
-        before=True,
+        seen_before_run=True,
     )
 
 
@@ -225,7 +225,7 @@ def _narrow_load_risk(one: ActiveExpression, longest: float) -> Risk:
         f"before the "
         f"run; steps stay below {longest:.2g} s where it was not examined",
         "give max_step",
-        before=True,
+        seen_before_run=True,
     )
 
 

@@ -85,17 +85,17 @@ class EngineCalls:
         return memory
 
     @cached_property
-    def inertia_alone(self) -> Self:
+    def inertia_only(self) -> Self:
         """Calls on the same tree without gravity, laws, drives and loads."""
         return self._pulled((0.0, 0.0, 0.0))
 
     @cached_property
-    def weighed(self) -> Self:
+    def gravity_only(self) -> Self:
         """Calls on the same tree with its gravity, without laws, drives and loads."""
         return self._pulled(tuple(self.packed.model.gravity))
 
     @cached_property
-    def pulled(self) -> tuple[Self, ...]:
+    def unit_gravity(self) -> tuple[Self, ...]:
         """Calls like `weighed`, with gravity of 1 m/s^2 along each inertial axis."""
         return tuple(self._pulled(tuple(row)) for row in np.eye(3).tolist())
 

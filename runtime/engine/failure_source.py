@@ -249,7 +249,7 @@ class _ExpressionValues:
 
     def _length(self, spring: Spring) -> tuple[float, float]:
         """Length of a spring, m, and its rate, m/s, which is nan if the ends coincide."""
-        inertia_engine, probes = self.engine.inertia_alone, []
+        inertia_engine, probes = self.engine.inertia_only, []
         for reference in (spring.from_, spring.to):
             body, axes, offset = self.engine.packed.end(reference)
             probes.append(Probe(body, axes, spring.position if body < 0 else offset))

@@ -70,7 +70,7 @@ class HarmonicResponse:
         for name, array in self._kept.items():
             setattr(record, name, engine.pointer(array))
         if engine.lib.mstmm_response_begin(record):
-            raise engine.failed(self.tangent.record.failure, t, *self.tangent.state)
+            raise engine.evaluation_error(self.tangent.record.failure, t, *self.tangent.state)
         self._exact = exact
         if exact is not None:
             self._order = np.argsort(exact.places)[::-1]

@@ -49,7 +49,7 @@ class OdeJacobian:
         self._outputs = ["qdot", "udot", *(["power"] if with_work else [])]
         self._tape, self._numbers = _tangent_kernel(model, self._outputs)
         #: Length of the memory that the kernel reads; stored inputs and controller states follow.
-        self._n_memory = model.packed.system.held.first
+        self._n_memory = model.packed_scene.system.held.first
 
     @property
     def exact(self) -> bool:
@@ -96,12 +96,12 @@ class OdeJacobian:
 
 def _tangent_kernel(model: CompiledScene, outputs: list[str]) -> tuple[TapeKernel | None, Numbers]:
     """Tangent kernel with respect to q and u, or None, and the function for its numbers p."""
-    packed, added_elements = model.packed, model.known or {}
+    packed, added_elements = model.packed_scene, model.known or {}
     if packed.releases or packed.system.count > MAX_BODIES:
         return None, _no_numbers
     structure, numbers = structure_of(packed.system, added_elements, floors=packed.floors)
     try:
-        kernels = model.fusion.fused(structure).kernels
+        kernels = model.fusion.structure_ir(structure).kernels
     except (ElementError, EnvironmentFailure):
         return None, _no_numbers
     kernel = kernels["accelerations"]

@@ -97,7 +97,7 @@ class TangentKernels:
 
     @cached_property
     def _accelerations(self) -> KernelIR:
-        kernel: KernelIR = self._fusion.fused(self.structure).kernels["accelerations"]
+        kernel: KernelIR = self._fusion.structure_ir(self.structure).kernels["accelerations"]
         return kernel
 
     def _kernel(self, port: str, output: str) -> KernelIR:

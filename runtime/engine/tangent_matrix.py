@@ -91,7 +91,7 @@ class TangentMatrix:
         if engine.lib.mstmm_linear_swept(
             self.record, t, *state_pointers, n, speed_indices, *result_pointers
         ):
-            raise engine.failed(self.record.failure, t, *self.state)
+            raise engine.evaluation_error(self.record.failure, t, *self.state)
         return matrices_found
 
     def factor(self, s: float, sq: float, kappa: float = 1.0, rate: float = 1.0) -> None:
@@ -194,7 +194,7 @@ class TangentMatrix:
         ]
         if getattr(self.engine.lib, f"mstmm_{name}")(self.record, *c_arguments):
             t = float(self.record.t)
-            raise self.engine.failed(self.record.failure, t, *self.state)
+            raise self.engine.evaluation_error(self.record.failure, t, *self.state)
 
 
 def thread_tangent(engine: LoopedEngine) -> TangentMatrix:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from mstmm.array_validation import Array, Integers
 from mstmm.errors import SceneError
+from mstmm.plain_data import stored_as
 
 from .c_tableau import c_tableau
 from .settings import Settings
@@ -107,9 +108,10 @@ class Statistics:
     """Counts and error estimates of a run so far.
 
     Attributes:
-        steps, rejected, evaluations, events: counts; evaluations are calls of the right-hand side.
+        steps, rejected_steps, evaluations, events: counts; evaluations are calls of the right-hand
+            side.
         smallest_step, largest_step: of steps not shortened by a break, an event or the end (s).
-        sum_local_error: sum over all steps of the RMS local error estimate, in the units of y.
+        sum_of_local_errors: sum over all steps of the RMS local error estimate, in the units of y.
             The error of the result may be larger by any factor.
         sum_scaled_error: the same in units of the tolerance.  Both None without an estimate.
         stiffness_index: last estimate of h |lambda|; largest_stiffness_index its maximum.
@@ -117,30 +119,30 @@ class Statistics:
             stability permits: the system is stiff for an explicit method, or the fixed step is
             long.
         stability_limited_steps: number of these steps.
-        crossings: number of steps that ended where an expression of the state switches.
+        switch_crossings: number of steps that ended where an expression of the state switches.
         residuals, tangents, solves, iterations: evaluations of the system by implicit methods, and
             iterations of Newton's method.
-        laws_tangents: number of approximate tangents, from inertia and laws only.
+        approximate_tangents: number of approximate tangents, from inertia and laws only.
     """
 
     steps: int
-    rejected: int
+    rejected_steps: int = field(metadata=stored_as("rejected"))
     evaluations: int
     events: int
     smallest_step: float | None
     largest_step: float | None
-    sum_local_error: float | None
+    sum_of_local_errors: float | None = field(metadata=stored_as("sum_local_error"))
     sum_scaled_error: float | None
     stiffness_index: float
     largest_stiffness_index: float
     stability_limited: bool
     stability_limited_steps: int
-    crossings: int = 0
+    switch_crossings: int = field(default=0, metadata=stored_as("crossings"))
     residuals: int = 0
     tangents: int = 0
     solves: int = 0
     iterations: int = 0
-    laws_tangents: int = 0
+    approximate_tangents: int = field(default=0, metadata=stored_as("laws_tangents"))
 
 
 class Integrator:
@@ -322,7 +324,7 @@ class Integrator:
         return int(self._run.count.steps)
 
     @property
-    def asked(self) -> bool:
+    def callback_requested(self) -> bool:
         """True if the last `advance` returned because of `call_back`."""
         return bool(self._run.count.asked)
 
@@ -419,23 +421,23 @@ class Integrator:
         has_steps = counts.steps > 0 and reals.largest_step > 0.0
         return Statistics(
             steps=int(counts.steps),
-            rejected=int(counts.rejected),
+            rejected_steps=int(counts.rejected),
             evaluations=int(counts.evaluations),
             events=int(counts.events_fired),
             smallest_step=float(reals.smallest_step) if has_steps else None,
             largest_step=float(reals.largest_step) if has_steps else None,
-            sum_local_error=float(reals.sum_local_error) if adaptive else None,
+            sum_of_local_errors=float(reals.sum_local_error) if adaptive else None,
             sum_scaled_error=float(reals.sum_scaled_error) if adaptive else None,
             stiffness_index=float(reals.stiffness),
             largest_stiffness_index=float(reals.largest_stiffness),
             stability_limited=bool(counts.stability_limited),
             stability_limited_steps=int(counts.stability_limited_steps),
-            crossings=int(counts.crossings),
+            switch_crossings=int(counts.crossings),
             residuals=int(counts.residuals),
             tangents=int(counts.tangents),
             solves=int(counts.solves),
             iterations=int(counts.iterations),
-            laws_tangents=int(counts.laws_tangents),
+            approximate_tangents=int(counts.laws_tangents),
         )
 
     @property

@@ -102,7 +102,7 @@ class FusedLibrary:
         call.memory[: self.n_memory], call.efforts[:] = memory[: self.n_memory], efforts
         return call(), call.qdot, call.udot
 
-    def many(
+    def accelerations_batch(
         self,
         p: Array,
         t: Array,

@@ -61,7 +61,7 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
     """
     found = dict[str, Motion]()
     for slots, k, _ in _driven(model):
-        if slots.straight:
+        if slots.rates_are_speeds:
             unit, speed = slots.u_units[k], slots.u_names[k]
             named = (
                 (slots.q_names[k], slots.q_units[k]),
@@ -75,12 +75,12 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
 
 def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]]:
     """Yield (slots of the hinge, index of its coordinate, drive) of all driven coordinates."""
-    packed = model.packed
+    packed = model.packed_scene
     for place, k in packed.system.driven:
         number = packed.topology.at(place)[1]
         drive = (packed.scene.hinges[number].drive or ())[k]
         if drive is not None:
-            yield model.layout.slots(number), k, drive
+            yield model.coordinate_layout.slots(number), k, drive
 
 
 def accelerations(model: CompiledScene, moves: Moves) -> list[str]:
@@ -91,7 +91,7 @@ def accelerations(model: CompiledScene, moves: Moves) -> list[str]:
 
 def coordinate(model: CompiledScene, speed: int) -> str:
     """Name of the coordinate whose rate is the speed."""
-    slots = model.layout.hinge_of_speed(speed)
+    slots = model.coordinate_layout.hinge_of_speed(speed)
     return f"{slots.name}.{slots.q_names[speed - slots.u]}"
 
 
@@ -105,7 +105,9 @@ def followers(model: CompiledScene, name: str, t: float) -> Moves:
         names = [one.text for one in drive.names]
         if name not in names:
             continue
-        if not slots.straight or not all(x in channels and channels[x].stands for x in names):
+        if not slots.rates_are_speeds or not all(
+            x in channels and channels[x].stands for x in names
+        ):
             raise SceneError(
                 f'"{name}": the drive of hinge "{slots.name}" follows this input, and goes by time '
                 "besides; name the motion of the drive itself for an input, or let the input stand "
@@ -136,7 +138,7 @@ def slopes_along(engine: LoopedEngine, state: State, along: Array) -> Columns:
     for speed in (int(first[place]) + k for place, k in driven):
         slots = engine.packed.layout.hinge_of_speed(speed)
         moved[slots.q + speed - slots.u] = along[speed]
-    tangent.residual(state.t, state.q, state.u, state.a)
+    tangent.residual(state.t, state.q, state.u, state.udot)
     return Columns(
         tangent.slope(0.0, moved, still, still),
         tangent.slope(0.0, at_rest, along, still),

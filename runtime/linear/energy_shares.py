@@ -33,12 +33,12 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 def kinetic(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each body in the kinetic energy of each shape."""
-    return kinetic_of_speeds(linear.model, linear.state.q, linear.spread(shapes))
+    return kinetic_of_speeds(linear.model, linear.state.q, linear.expand(shapes))
 
 
 def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each body in the kinetic energy of speeds (nu, k) at q (nq,)."""
-    engine, parts = model.apart, [np.real(speeds)]
+    engine, parts = model.unmerged_engine, [np.real(speeds)]
     if np.iscomplexobj(speeds):
         parts.append(np.imag(speeds))
     energies = np.zeros((speeds.shape[1], engine.packed.topology.count))
@@ -52,14 +52,14 @@ def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> d
 
 def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each owner of coordinates, and of "springs", in the elastic energy."""
-    tree, free = linear.tree, list(linear.model.free_speeds)
-    shapes = linear.spread(shapes)[free]
+    tree, free = linear.open_tree, list(linear.model.free_speed_indices)
+    shapes = linear.expand(shapes)[free]
     whole, lawless, held = (
         along(_pressed(linear, engine), shapes)
         for engine in (tree, without_laws(tree), with_frozen_springs(tree, linear.state))
     )
     own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear.model, shapes)))
-    names = [name.rpartition(".")[0] for name, _ in linear.model.increments]
+    names = [name.rpartition(".")[0] for name, _ in linear.model.tangent_increments]
     if not linear.model.scene.forces:
         return _parts(names, own)
     sprung = np.real(np.conj(shapes) * (lawless - held)).sum(axis=0)
@@ -68,8 +68,8 @@ def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
 
 def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
     """Operator K x of a scene, with x' = G x + du."""
-    pencil = Pencil(engine, linear.state, list(linear.model.free_speeds))
-    turning = linear.turning if linear.mechanism is None else None
+    pencil = Pencil(engine, linear.state, list(linear.model.free_speed_indices))
+    turning = linear.rate_matrix if linear.constrained_motion is None else None
     if turning is None:
         return pencil.stiffness
     return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)
@@ -78,11 +78,11 @@ def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
 def _by_shapes(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
     """Product (n, k) of the stiffness of flexible bodies and increments x of all free speeds."""
     moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
-    moved[list(model.free_speeds)] = x
+    moved[list(model.free_speed_indices)] = x
     pressed = np.zeros_like(moved)
-    for name, slots in model.layout.modal.items():
-        pressed[slots.u_slice] = model.flexible[name].K @ moved[slots.u_slice]
-    return pressed[list(model.free_speeds)]
+    for name, slots in model.coordinate_layout.modal.items():
+        pressed[slots.u_slice] = model.flexible_bodies[name].K @ moved[slots.u_slice]
+    return pressed[list(model.free_speed_indices)]
 
 
 def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:

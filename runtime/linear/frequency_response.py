@@ -66,18 +66,18 @@ class FrequencyResponse(AssessedAnswer):
 
     Attributes:
         omega: (k,) requested angular frequencies, rad/s.
-        inputs, outputs: names.
+        input_names, output_names: names.
         input_units, output_units: their units.
-        values: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
+        response: (k, outputs, inputs) complex; an output is Re(values exp(i omega t)).
         findings: risks of the linear model and of this response.
     """
 
     omega: Array = field(repr=False)
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
     input_units: tuple[str, ...] = field(repr=False)
     output_units: tuple[str, ...] = field(repr=False)
-    values: Complex = field(repr=False)
+    response: Complex = field(repr=False)
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     @property
@@ -88,12 +88,12 @@ class FrequencyResponse(AssessedAnswer):
     @property
     def magnitude(self) -> Array:
         """Magnitude (k, outputs, inputs) in output units per input unit."""
-        return np.abs(self.values)
+        return np.abs(self.response)
 
     @property
     def phase(self) -> Array:
         """Phase (k, outputs, inputs), rad in (-pi, pi]; negative where the output lags."""
-        return np.angle(self.values)
+        return np.angle(self.response)
 
     def plot(self, path: str | Path | None = None) -> Any:
         """Bode plot as a `matplotlib.figure.Figure`, written to `path` if given.
@@ -111,7 +111,7 @@ class FrequencyResponse(AssessedAnswer):
         unit = units[0] if len(set(units)) == 1 else "units of the curves"
         return bode(self.frequency, values, labels, unit, path)
 
-    def nyquist(self, path: str | Path | None = None) -> Any:
+    def plot_nyquist(self, path: str | Path | None = None) -> Any:
         """Nyquist plot as a `matplotlib.figure.Figure`; see `plot`."""
         from .plots.bode_and_locus import nyquist
 
@@ -119,29 +119,29 @@ class FrequencyResponse(AssessedAnswer):
 
     def _curves(self) -> tuple[Complex, list[str]]:
         """Values (k, curves) and the label of each curve."""
-        labels = [f"{y} / {u}" for y in self.outputs for u in self.inputs]
-        return self.values.reshape(len(self.omega), -1), labels
+        labels = [f"{y} / {u}" for y in self.output_names for u in self.input_names]
+        return self.response.reshape(len(self.omega), -1), labels
 
     def to_dict(self) -> dict[str, Any]:
         """All data as a dictionary for JSON, with real and imaginary parts."""
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
-            "inputs": list(self.inputs), "outputs": list(self.outputs),
+            "inputs": list(self.input_names), "outputs": list(self.output_names),
             "input_units": list(self.input_units), "output_units": list(self.output_units),
-            "real": self.values.real.tolist(), "imag": self.values.imag.tolist(),
+            "real": self.response.real.tolist(), "imag": self.response.imag.tolist(),
             **self.assessment(),
         }  # fmt: skip
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` with real and imaginary parts; EnvironmentFailure without the extra."""
         along = ("omega", "output", "input")
         arrays: dict[str, Any] = {
-            "real": (along, self.values.real), "imag": (along, self.values.imag),
+            "real": (along, self.response.real), "imag": (along, self.response.imag),
             "magnitude": (along, self.magnitude), "phase": (along, self.phase, {"units": "rad"}),
         }  # fmt: skip
         coords: dict[str, Any] = {
             "omega": ("omega", self.omega, {"units": "rad/s"}),
-            "output": list(self.outputs), "input": list(self.inputs),
+            "output": list(self.output_names), "input": list(self.input_names),
         }  # fmt: skip
         return file_formats.xarray().Dataset(arrays, coords)
 
@@ -159,7 +159,7 @@ class FrequencyResponse(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def frequency_response(
@@ -181,7 +181,7 @@ def frequency_response(
         refuse_inner(beams, [*(inputs or ()), *read_by(linear, outputs)])
         linear = beams.linear
         if outputs is None and not linear.model.scene.output:
-            outputs = [name for name in linear.coordinates if not beams.named(name)]
+            outputs = [name for name in linear.coordinate_names if not beams.named(name)]
             if not outputs:
                 raise SceneError(
                     "exact: all coordinates are shapes of beams; name outputs, such as "
@@ -241,7 +241,7 @@ def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequ
     """Named inputs, else those of the model, else its disturbances; SceneError for none."""
     if inputs is not None:
         return [channel(linear.model, name) for name in some_names("inputs", inputs)]
-    pushes = linear.controls or linear.others
+    pushes = linear.input_channels or linear.disturbance_channels
     if not pushes:
         raise SceneError("frequency response: the model has no inputs; name some")
     return pushes
@@ -249,11 +249,11 @@ def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequ
 
 def _efforts(linear: LinearEquations, pushes: Sequence[Channel]) -> Array:
     """Efforts (n, pushes) per unit of each input; matrices cached by the model are reused."""
-    if pushes is linear.controls:
+    if pushes is linear.input_channels:
         return linear.V
-    if pushes is linear.others:
+    if pushes is linear.disturbance_channels:
         return linear.W
-    return linear.pushed(pushes)
+    return linear.input_matrix(pushes)
 
 
 class _Sweep:
@@ -263,7 +263,7 @@ class _Sweep:
         self, linear: LinearEquations, pushes: Sequence[Channel], outputs: Sequence[LinearQuantity],
         structural: Losses, modal: Ratios, beams: ExactBeams | None,
     ) -> None:  # fmt: skip
-        engine, free = linear.tree, list(linear.free)
+        engine, free = linear.open_tree, list(linear.free_speed_indices)
         refuse_in_motion(linear, structural, modal)
         lossy = stiffer(linear, structural) if is_requested(structural) else None
         self.modal = modal_damping(linear, modal) if is_requested(modal) else None
@@ -364,12 +364,12 @@ def _response(
     linear: LinearEquations, lossy: LoopedEngine | None, beams: ExactBeams | None
 ) -> HarmonicResponse | Amplitudes:
     """Solver for amplitudes: elimination for a tree at rest, else from matrices."""
-    state, loops = linear.state, linear.mechanism
-    if loops is not None or linear.turning is not None or linear.carrying is not None:
+    state, loops = linear.state, linear.constrained_motion
+    if loops is not None or linear.rate_matrix is not None or linear.carrying is not None:
         lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
-        return Amplitudes(linear.free, Matrices(linear.M, linear.C, linear.K), lost)
+        return Amplitudes(linear.free_speed_indices, Matrices(linear.M, linear.C, linear.K), lost)
     return HarmonicResponse(
-        linear.tree, state.t, state.q, state.u, state.a, stiffer=lossy,
+        linear.open_tree, state.t, state.q, state.u, state.udot, stiffer=lossy,
         exact=None if beams is None else beams.bodies,
     )  # fmt: skip
 

@@ -44,7 +44,7 @@ class HarmonicLoads:
         powers = [2 - one.drive if one.drive >= 0 else 0 for one in pushes]
         for j, one in enumerate(pushes):
             if one.drive >= 0:
-                moved = linear.driving(one.moves)
+                moved = linear.drive_columns(one.moves)
                 columns += [-_placed(linear, x) for x in (moved.stiffness, moved.damping)]
                 powers += [-one.drive, 1 - one.drive]
                 owners += [j, j]
@@ -74,5 +74,5 @@ class HarmonicLoads:
 def _placed(linear: LinearEquations, x: Array) -> Array:
     """Vector (nu,) with the entries of x (n,) at the indices of its speeds."""
     found = np.zeros(linear.model.nu)
-    found[list(linear.free)] = x
+    found[list(linear.free_speed_indices)] = x
     return found

@@ -126,7 +126,7 @@ def channel(model: CompiledScene, name: str) -> Channel:
     if given is not None:
         if any(one.drive and name in one.inputs for one in active_expressions(model.scene)):
             return _following(model, given)
-        return Channel(name, given.unit, input=model.layout.inputs[name])
+        return Channel(name, given.unit, input=model.coordinate_layout.inputs[name])
     if name in GROUND:
         return Channel(name, "m/s2", axis=_AXES.index(last))
     driven = motions(model)
@@ -134,7 +134,7 @@ def channel(model: CompiledScene, name: str) -> Channel:
         motion = driven[name]
         return Channel(name, motion.unit, drive=motion.order, moves=((motion.speed, 1.0),))
     ends = BodyReferences(model.scene.skeleton)
-    if last.startswith("effort") and owner in model.layout.hinges:
+    if last.startswith("effort") and owner in model.coordinate_layout.hinges:
         return _effort(model, name, owner, last)
     springs = [one.name for one in model.scene.spring]
     if last == "effort" and owner in springs:
@@ -177,12 +177,12 @@ def _following(model: CompiledScene, given: Input) -> Channel:
 
 
 def _effort(model: CompiledScene, name: str, hinge: str, last: str) -> Channel:
-    slots = model.layout.hinges[hinge]
+    slots = model.coordinate_layout.hinges[hinge]
     names = effort_names(slots.u_names)
     if last not in names:
         raise SceneError(f'"{name}": hinge "{hinge}" has {", ".join(names) or "no speeds"}')
     k = names.index(last)
-    if slots.u + k not in model.free_speeds:
+    if slots.u + k not in model.free_speed_indices:
         raise SceneError(
             f'"{name}": hinge "{hinge}" is driven there, so that an effort moves nothing; push '
             "somewhere else, or take the motion of the drive for an input, such as "
@@ -192,7 +192,7 @@ def _effort(model: CompiledScene, name: str, hinge: str, last: str) -> Channel:
 
 
 def _efforts(model: CompiledScene) -> list[str]:
-    hinges = model.layout.hinges
+    hinges = model.coordinate_layout.hinges
     return [f"{name}.{effort}" for name in hinges for effort in effort_names(hinges[name].u_names)]
 
 
@@ -208,7 +208,7 @@ def columns(
         """Required efforts at rest in excess of those of the unloaded tree."""
         bare, loaded = (
             each.inverse_dynamics(state.t, state.q, still, still, memory)
-            for each in (engine.inertia_alone, of)
+            for each in (engine.inertia_only, of)
         )
         return np.asarray(loaded - bare)
 
@@ -227,7 +227,7 @@ def columns(
         elif one.end:
             found.append(-beyond(_under(engine, one)))
         else:
-            found.append(beyond(engine.pulled[one.axis]))
+            found.append(beyond(engine.unit_gravity[one.axis]))
     return np.array(found).T[free]
 
 
@@ -243,7 +243,7 @@ def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
     still = replace(system.held, places=(-1,) * len(inputs))
     going = replace(system, inputs=tuple(inputs), held=still)
     tangent = TangentMatrix(LoopedEngine(packed_system(going, engine.packed)))
-    tangent.residual(state.t, state.q, state.u, state.a)
+    tangent.residual(state.t, state.q, state.u, state.udot)
     nothing = np.zeros(engine.nu)
     return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)
 

@@ -66,7 +66,7 @@ def slowest(
     found, more = known, 0
     for _ in range(_RUNS):
         run = _Run(pencil, found, start)
-        run.go(wanted - more, 1 / (edge - sigma))
+        run.iterate(wanted - more, 1 / (edge - sigma))
         squares = sigma + 1 / run.values
         found = found.joined(squares, run.shapes, run.pushed)
         more += len(squares)
@@ -98,7 +98,7 @@ class _Run:
         self.values, self.shapes, self.pushed = np.zeros(0), np.zeros((n, 0)), np.zeros((0, n))
         self.ended = False
 
-    def go(self, wanted: int, least: float) -> None:
+    def iterate(self, wanted: int, least: float) -> None:
         """Iterate until `wanted` modes are found in order.
 
         Stop early at a mode with 1/(omega^2 - sigma) below `least`, or without space for further

@@ -63,34 +63,38 @@ class LinearEquations(AssessedAnswer):
 
     model: CompiledScene
     state: State
-    controls: tuple[Channel, ...] = ()
-    others: tuple[Channel, ...] = ()
-    turning: Array | None = field(default=None, repr=False)
-    about: CompiledState | None = field(default=None, repr=False)
-    mechanism: ConstrainedLinearisation | None = field(default=None, repr=False)
+    input_channels: tuple[Channel, ...] = ()
+    disturbance_channels: tuple[Channel, ...] = ()
+    rate_matrix: Array | None = field(default=None, repr=False)
+    compiled_state: CompiledState | None = field(default=None, repr=False)
+    constrained_motion: ConstrainedLinearisation | None = field(default=None, repr=False)
     dry: DryFriction | None = field(default=None, repr=False)
     carrying: Carrying | None = field(default=None, repr=False)
     at_speeds: Callable[[Array], LinearEquations] | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (
-            f"<{type(self).__name__}: {len(self)} coordinates, {len(self.controls)} inputs, "
-            f"{len(self.others)} disturbances, at t = {self.state.t:g} s>"
+            f"<{type(self).__name__}: {len(self)} coordinates, {len(self.input_channels)} inputs, "
+            f"{len(self.disturbance_channels)} disturbances, at t = {self.state.t:g} s>"
         )
 
     def __len__(self) -> int:
-        return len(self.free)
+        return len(self.free_speed_indices)
 
     @property
-    def free(self) -> tuple[int, ...]:
+    def free_speed_indices(self) -> tuple[int, ...]:
         """Indices of the speeds that x belongs to."""
-        return self.model.free_speeds if self.mechanism is None else self.mechanism.places
+        return (
+            self.model.free_speed_indices
+            if self.constrained_motion is None
+            else self.constrained_motion.places
+        )
 
     @property
-    def tree(self) -> LoopedEngine:
+    def open_tree(self) -> LoopedEngine:
         """Engine of the spanning tree, with dry friction as in the linear model."""
-        if self.mechanism is not None:
-            return self.mechanism.tree
+        if self.constrained_motion is not None:
+            return self.constrained_motion.tree
         return self._smooth if self.dry else self.model.looped
 
     @cached_property
@@ -101,16 +105,16 @@ class LinearEquations(AssessedAnswer):
     @cached_property
     def _named(self) -> list[tuple[str, str]]:
         """Names and units of x."""
-        known = dict(zip(self.model.free_speeds, self.model.increments, strict=True))
-        return [known[place] for place in self.free]
+        known = dict(zip(self.model.free_speed_indices, self.model.tangent_increments, strict=True))
+        return [known[place] for place in self.free_speed_indices]
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def coordinate_names(self) -> tuple[str, ...]:
         """Names of x."""
         return tuple(name for name, _ in self._named)
 
     @property
-    def units(self) -> tuple[str, ...]:
+    def coordinate_units(self) -> tuple[str, ...]:
         """Units of x."""
         return tuple(unit for _, unit in self._named)
 
@@ -118,32 +122,32 @@ class LinearEquations(AssessedAnswer):
 
     @cached_property
     def _whole(self) -> Matrices:
-        about = self.about
+        about = self.compiled_state
         if about is not None:
             return self._second_order(Matrices(about.M, about.C, about.K))
         check_dense_size(len(self), "the matrix of a linear model")
-        return self._second_order(self._of(self.tree))
+        return self._second_order(self._of(self.open_tree))
 
     @cached_property
     def _held(self) -> Matrices:
-        return self._second_order(self._of(with_frozen_springs(self.tree, self.state)))
+        return self._second_order(self._of(with_frozen_springs(self.open_tree, self.state)))
 
     @cached_property
     def _standing(self) -> Matrices:
-        return self._second_order(self._of(standing(self.tree, self.state)))
+        return self._second_order(self._of(standing(self.open_tree, self.state)))
 
     def _of(self, engine: LoopedEngine) -> Matrices:
         """Matrices along x of the spanning tree, or of a variant with other elements."""
-        if self.mechanism is not None:
-            return self.mechanism.matrices(engine, self.state)
-        return matrices(engine, self.state, list(self.free))
+        if self.constrained_motion is not None:
+            return self.constrained_motion.matrices(engine, self.state)
+        return matrices(engine, self.state, list(self.free_speed_indices))
 
     def _second_order(self, found: Matrices) -> Matrices:
         """Transform from speeds to x' and to the fixed frame.
 
         From x' = G x + du: C du = C x' - C G x and M da = M x'' - M G x'.
         """
-        g = self.turning
+        g = self.rate_matrix
         if g is not None:
             found = Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
         return found if self.carrying is None else self.carrying.matrices(found)
@@ -169,33 +173,33 @@ class LinearEquations(AssessedAnswer):
         return self._whole.K
 
     @cached_property
-    def damping(self) -> Array:
+    def C_damping(self) -> Array:
         """Damping part (n, n) of C: from laws, flexible bodies and loads."""
         return self.C - self._standing.C + self._of_shapes(lambda body: body.D)
 
     @property
-    def gyroscopic(self) -> Array:
+    def C_gyroscopic(self) -> Array:
         """Gyroscopic part (n, n) of C: inertia forces of the motion at the state; zero at rest."""
-        return self.C - self.damping
+        return self.C - self.C_damping
 
     @cached_property
-    def elastic(self) -> Array:
+    def K_elastic(self) -> Array:
         """Elastic part (n, n) of K: from hinge laws, springs and flexible bodies."""
         return self.K - self._held.K + self._of_shapes(lambda body: body.K)
 
     @cached_property
-    def sprung(self) -> Array:
+    def K_springs(self) -> Array:
         """Part (n, n) of `elastic` from springs between ends."""
-        lawless = self._second_order(self._of(without_laws(self.tree)))
+        lawless = self._second_order(self._of(without_laws(self.open_tree)))
         return lawless.K - self._held.K
 
     @property
-    def load(self) -> Array:
+    def K_load(self) -> Array:
         """Load stiffness (n, n) in K: from loads in body axes and loads by expressions."""
         return self._held.K - self._standing.K
 
     @property
-    def geometric(self) -> Array:
+    def K_geometric(self) -> Array:
         """Geometric stiffness (n, n) in K.
 
         It stems from gravity, inertia forces and constant loads and tensions on the displaced
@@ -204,82 +208,84 @@ class LinearEquations(AssessedAnswer):
         return self._standing.K - self._of_shapes(lambda body: body.K)
 
     @property
-    def inputs(self) -> tuple[str, ...]:
+    def input_names(self) -> tuple[str, ...]:
         """Names of v."""
-        return tuple(one.name for one in self.controls)
+        return tuple(one.name for one in self.input_channels)
 
     @property
-    def disturbances(self) -> tuple[str, ...]:
+    def disturbance_names(self) -> tuple[str, ...]:
         """Names of w."""
-        return tuple(one.name for one in self.others)
+        return tuple(one.name for one in self.disturbance_channels)
 
     @property
-    def drives(self) -> tuple[int, ...]:
+    def drive_indices(self) -> tuple[int, ...]:
         """Speed indices of the drives whose motions are inputs or disturbances."""
-        moved = [one.moves for one in (*self.controls, *self.others) if one.moves]
+        moved = [
+            one.moves for one in (*self.input_channels, *self.disturbance_channels) if one.moves
+        ]
         return tuple(dict.fromkeys(speed for one in moved for speed, _ in one)) if moved else ()
 
     @property
-    def driven(self) -> tuple[str, ...]:
+    def prescribed_coordinates(self) -> tuple[str, ...]:
         """Names of d, the increments of the coordinates of these drives."""
-        return tuple(coordinate(self.model, speed) for speed in self.drives)
+        return tuple(coordinate(self.model, speed) for speed in self.drive_indices)
 
     @cached_property
     def _moved(self) -> tuple[Array, Array]:
         """Matrices K_driven and C_driven, each (n, drives)."""
-        if self.drives and self.carrying is not None:
+        if self.drive_indices and self.carrying is not None:
             raise SceneError(
                 "fixed frame: motions of drives are not inputs there; leave them out, or push by "
                 "efforts and forces"
             )
-        found = [self.driving(((speed, 1.0),)) for speed in self.drives]
+        found = [self.drive_columns(((speed, 1.0),)) for speed in self.drive_indices]
         both = [(one.stiffness, one.damping) for one in found]
         wide = np.reshape(both, (len(found), 2, len(self)))
         return wide[:, 0].T, wide[:, 1].T
 
-    def driving(self, moves: Moves) -> Columns:
+    def drive_columns(self, moves: Moves) -> Columns:
         """Columns (n,) of drives that follow one common motion."""
-        if self.mechanism is not None:
-            return self.mechanism.driven(self.state, moves)
+        if self.constrained_motion is not None:
+            return self.constrained_motion.driven(self.state, moves)
         wide = columns_of(self.model.looped, self.state, moves)
-        return Columns(*(one[list(self.free)] for one in wide))
+        return Columns(*(one[list(self.free_speed_indices)] for one in wide))
 
     @property
-    def C_driven(self) -> Array:
+    def C_prescribed(self) -> Array:
         """Matrix (n, drives) of d' on the left-hand side."""
         return self._moved[1]
 
     @property
-    def K_driven(self) -> Array:
+    def K_prescribed(self) -> Array:
         """Matrix (n, drives) of d on the left-hand side."""
         return self._moved[0]
 
     @cached_property
     def V(self) -> Array:
         """Efforts (n, inputs) per unit of each input."""
-        return self.pushed(self.controls)
+        return self.input_matrix(self.input_channels)
 
     @cached_property
     def W(self) -> Array:
         """Efforts (n, disturbances) per unit of each disturbance."""
-        return self.pushed(self.others)
+        return self.input_matrix(self.disturbance_channels)
 
-    def pushed(self, channels: Sequence[Channel]) -> Array:
+    def input_matrix(self, channels: Sequence[Channel]) -> Array:
         """Efforts (n, channels) per unit of each channel."""
-        if self.mechanism is None:
-            found = columns(self.tree, self.state, channels, list(self.free))
+        if self.constrained_motion is None:
+            found = columns(self.open_tree, self.state, channels, list(self.free_speed_indices))
         else:
-            found = self.mechanism.pushed(self.state, channels)
+            found = self.constrained_motion.pushed(self.state, channels)
         return found if self.carrying is None else self.carrying.pushed(found)
 
     def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
         """Matrix (n, n) assembled from a matrix of each flexible body."""
         found = np.zeros((self.model.nu, self.model.nu))
-        for name, slots in self.model.layout.modal.items():
-            found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible[name])
-        if self.mechanism is not None:
-            return self.mechanism.ways.T @ found @ self.mechanism.ways
-        return found[np.ix_(self.free, self.free)]
+        for name, slots in self.model.coordinate_layout.modal.items():
+            found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible_bodies[name])
+        if self.constrained_motion is not None:
+            return self.constrained_motion.ways.T @ found @ self.constrained_motion.ways
+        return found[np.ix_(self.free_speed_indices, self.free_speed_indices)]
 
     def symbolic(self, keep: Sequence[str]) -> SymbolicLinearModel:
         """M, C, K, V and W as SymPy expressions in the names `keep`.
@@ -298,7 +304,7 @@ class LinearEquations(AssessedAnswer):
             raise SceneError(
                 "symbolic: linear models in the fixed frame are numbers; take M, C and K"
             )
-        if self.mechanism is not None:
+        if self.constrained_motion is not None:
             raise SceneError(
                 "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
                 "and K as they are"
@@ -308,23 +314,23 @@ class LinearEquations(AssessedAnswer):
         return found
 
     @cached_property
-    def pencil(self) -> Pencil:
+    def operators(self) -> Pencil:
         """M, C and K as O(bodies) operators without matrices, for trees at rest."""
-        return Pencil(self.tree, self.state, list(self.free))
+        return Pencil(self.open_tree, self.state, list(self.free_speed_indices))
 
-    def spread(self, x: NDArray[Any]) -> NDArray[Any]:
+    def expand(self, x: NDArray[Any]) -> NDArray[Any]:
         """Increments (nu, ...) along all speeds for x (n, ...)."""
         if self.carrying is not None:
             x = np.linalg.solve(self.carrying.turned, x)
-        if self.mechanism is not None:
-            return np.asarray(self.mechanism.ways @ x)
+        if self.constrained_motion is not None:
+            return np.asarray(self.constrained_motion.ways @ x)
         found = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)
-        found[list(self.free)] = x
+        found[list(self.free_speed_indices)] = x
         return found
 
-    def displaced(self, x: Array) -> Array:
+    def displaced_state(self, x: Array) -> Array:
         """Coordinates q (nq,) of the state displaced by increments x (n,)."""
-        model, speeds = self.model, self.spread(x)
+        model, speeds = self.model, self.expand(x)
         engine, state = model.looped, self.state
         moved = state.q + engine.rates(state.t, state.q, speeds, engine.start_memory())
         return SceneSystem(engine).start(state.t, moved, state.u)[: model.nq]

@@ -120,7 +120,7 @@ class Linear(StateSpace):
         """
         return frequency_response(self, omega, inputs, outputs, structural, modal, exact)
 
-    def exact_modes(self, count: int, exact: Chosen = True) -> DynamicStiffnessModes:
+    def dynamic_stiffness_modes(self, count: int, exact: Chosen = True) -> DynamicStiffnessModes:
         """The `count` slowest undamped modes with exact beams.
 
         `exact` is as in `frequency_response`.  Modes are found by counting, so that none is missed.
@@ -142,7 +142,7 @@ class Linear(StateSpace):
         """
         from .python_control import output_matrices
 
-        return output_matrices(self, outputs, self.controls, self.B)[1:]
+        return output_matrices(self, outputs, self.input_channels, self.B)[1:]
 
     def to_control(self, outputs: Sequence[str] | None = None, disturbances: bool = False) -> Any:
         """Model as a `control.StateSpace` of python-control (extra control).

@@ -26,7 +26,7 @@ class Pencil:
         self.state, self._nothing = state, np.zeros(engine.nu)
         self.tangent.allow_negative()
         self._no_q = np.zeros(engine.nq)
-        self._inertia = engine.inertia_alone
+        self._inertia = engine.inertia_only
         self._strained = self._required(self._nothing)
         self._factored: tuple[float, float] | None = None
         self._begin()
@@ -36,7 +36,7 @@ class Pencil:
 
     def _begin(self) -> None:
         state = self.state
-        self.tangent.residual(state.t, state.q, state.u, state.a)
+        self.tangent.residual(state.t, state.q, state.u, state.udot)
 
     def _full(self, x: Array) -> Array:
         whole = self._nothing.copy()

@@ -31,7 +31,7 @@ class State:
     t: float
     q: Array
     u: Array
-    a: Array
+    udot: Array
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Matrices:
 
 def matrices(engine: LoopedEngine, state: State, free: Sequence[int]) -> Matrices:
     """Matrices of a packed scene; NumericalFailure if the state cannot be evaluated."""
-    found = thread_tangent(engine).matrices(state.t, state.q, state.u, state.a, free)
+    found = thread_tangent(engine).matrices(state.t, state.q, state.u, state.udot, free)
     if not np.isfinite(found).all():
         raise _no_slope(engine, state)
     return Matrices(*found)

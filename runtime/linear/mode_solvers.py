@@ -27,24 +27,24 @@ _ROUNDING = 1e-7
 def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Modes:
     """Modes of a linear model; see `Linear.modes`."""
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
-    few = few and linear.mechanism is None and linear.carrying is None
-    if count is None or not few or linear.turning is not None:
+    few = few and linear.constrained_motion is None and linear.carrying is None
+    if count is None or not few or linear.rate_matrix is not None:
         found = _dense(linear, damped)
-        return found if count is None else replace(found.first(count), count=count)
+        return found if count is None else replace(found.lowest(count), count=count)
     return replace(_few(linear, count, damped), count=count)
 
 
 def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
     from . import shift_invert_modes
 
-    pencil = linear.pencil
+    pencil = linear.operators
     x = np.random.default_rng(0).standard_normal(len(linear))
     with_c = bool(pencil.damping(x).any()) if damped is None else damped
     if with_c or pencil.skew() > _SYMMETRIC:
         slowest = shift_invert_modes.damped_modes(pencil, count, with_c)
         return Modes(linear, slowest.values, slowest.shapes, None)
     slowest = shift_invert_modes.undamped_modes(pencil, count)
-    return _ordered(linear, slowest.values, slowest.shapes, slowest.complete)
+    return _ordered(linear, slowest.values, slowest.shapes, slowest.is_complete)
 
 
 def _dense(linear: LinearEquations, damped: bool | None) -> Modes:
@@ -102,7 +102,7 @@ def _general(linear: LinearEquations, c: Array) -> Modes:
 
 
 def _no_inertia(linear: LinearEquations) -> NumericalFailure:
-    names = ", ".join(linear.coordinates[:3])
+    names = ", ".join(linear.coordinate_names[:3])
     return NumericalFailure(
         f"modes: the mass matrix of {names}, ... is not positive, so that some motion has no "
         "frequency; give what these move inertia"

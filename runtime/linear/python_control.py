@@ -37,16 +37,16 @@ def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: 
         import control
     except ImportError as error:
         raise missing_package_error("control", "a system for python-control", error) from None
-    b, pushes = linear.B, linear.controls
+    b, pushes = linear.B, linear.input_channels
     if disturbances:
-        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.others)
+        b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.disturbance_channels)
     if not pushes:
         raise SceneError(
             'the model has no inputs: name some, as in linearize(inputs=["shoulder.effort"])'
         )
     names, c, d = output_matrices(linear, outputs, pushes, b)
     return control.ss(
-        linear.A, b, c, d, states=list(map(_signal, linear.states)),
+        linear.A, b, c, d, states=list(map(_signal, linear.state_names)),
         inputs=[_signal(one.name) for one in pushes], outputs=list(map(_signal, names)),
     )  # fmt: skip
 

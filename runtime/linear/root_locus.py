@@ -46,7 +46,7 @@ class RootLocus(AssessedAnswer):
     """Eigenvalues over a parameter.
 
     Attributes:
-        values: (m,) values of the parameter.
+        parameter_values: (m,) values of the parameter.
         eigenvalues: (m, k), one column per mode; nan where a mode is missing at a value.
         frame: frame of frequencies and whirl, "fixed" or "rotating".  In the rotating frame, in
             which coordinates rotate with the spinning bodies, a whirl of frequency f in the fixed
@@ -55,8 +55,8 @@ class RootLocus(AssessedAnswer):
         findings: risks at each value, and of the diagram.
     """
 
-    parameter: str
-    values: Array = field(repr=False)
+    parameter_name: str
+    parameter_values: Array = field(repr=False)
     eigenvalues: Complex = field(repr=False)
     frame: str = "fixed"
     whirl: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
@@ -68,7 +68,7 @@ class RootLocus(AssessedAnswer):
         return np.abs(self.eigenvalues.imag) / (2 * np.pi)
 
     @property
-    def growth(self) -> Array:
+    def growth_rate(self) -> Array:
         """Growth rates (m, k) in 1/s; negative for decay."""
         return np.asarray(self.eigenvalues.real)
 
@@ -85,30 +85,41 @@ class RootLocus(AssessedAnswer):
 
         lines = np.atleast_1d(finite_array("orders", orders)).tolist()
         return locus(
-            self.parameter, self.values, self.eigenvalues, path, lines, self.frame, self.whirl
+            self.parameter_name,
+            self.parameter_values,
+            self.eigenvalues,
+            path,
+            lines,
+            self.frame,
+            self.whirl,
         )
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` of frequency, growth and whirl; EnvironmentFailure without the extra."""
         along = ("value", "motion")
         arrays: dict[str, Any] = {
             "frequency": (along, self.frequency, {"units": "Hz"}),
-            "growth": (along, self.growth, {"units": "1/s"}),
+            "growth": (along, self.growth_rate, {"units": "1/s"}),
             "whirl": (along, self.whirl),
         }
-        coords = {"value": self.values, "motion": np.arange(1, self.eigenvalues.shape[1] + 1)}
-        about = {"parameter": self.parameter, "frame": self.frame}
+        coords = {
+            "value": self.parameter_values,
+            "motion": np.arange(1, self.eigenvalues.shape[1] + 1),
+        }
+        about = {"parameter": self.parameter_name, "frame": self.frame}
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row per parameter value."""
         motions = range(1, self.eigenvalues.shape[1] + 1)
         yield (
-            self.parameter,
+            self.parameter_name,
             *(f"{k} {part}" for k in motions for part in ("frequency [Hz]", "growth [1/s]")),
         )
-        pairs = np.stack([self.frequency, self.growth], axis=2).reshape(len(self.values), -1)
-        for value, row in zip(self.values.tolist(), pairs.tolist(), strict=True):
+        pairs = np.stack([self.frequency, self.growth_rate], axis=2).reshape(
+            len(self.parameter_values), -1
+        )
+        for value, row in zip(self.parameter_values.tolist(), pairs.tolist(), strict=True):
             yield tuple(map(repr, (value, *row)))
 
     def save(self, path: str | Path) -> Path:
@@ -116,7 +127,7 @@ class RootLocus(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def trace_modes(
@@ -189,16 +200,16 @@ class StabilityLimit(AssessedAnswer):
     Attributes:
         kind: "divergence" (loss of stiffness, as in buckling) or "flutter".
         frequency: of the unstable mode, Hz, in `frame`.
-        moving: dominant coordinates of the unstable mode.
+        dominant_coordinates: dominant coordinates of the unstable mode.
         findings: risks of the last stable state below the limit.
         frame: "fixed" or "rotating".
     """
 
-    parameter: str
+    parameter_name: str
     value: float
     kind: str
     frequency: float
-    moving: tuple[str, ...]
+    dominant_coordinates: tuple[str, ...]
     findings: Iterable[Risk] = field(default=(), repr=False)
     frame: str = "fixed"
 
@@ -232,7 +243,7 @@ def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
             high, last = middle, found
     growing = None if last is None else _growing(last)
     value, names = (0j, ()) if last is None or growing is None else (
-        complex(last.eigenvalues[growing]), tuple(last.moving(growing))
+        complex(last.eigenvalues[growing]), tuple(last.dominant_coordinates(growing))
     )  # fmt: skip
     kind = "divergence" if value.imag == 0 else "flutter"
     lost = _lost_equilibrium(parameter, high, first, below) if last is None else ()
@@ -270,7 +281,7 @@ def _risks_below(parameter: str, value: float, below: Modes) -> Iterator[Risk]:
     own = (
         risk for risk in below.risks
         if risk.name not in ("unstable", "unrestrained", "frequency-range")
-        and not (risk.name == "buckling" and risk.figure is not None and risk.figure < _ALIKE)
+        and not (risk.name == "buckling" and risk.value is not None and risk.value < _ALIKE)
     )  # fmt: skip
     return merge_over_values(parameter, [(value, own)])
 

@@ -44,12 +44,12 @@ _GAP = 1e-9
 class LowestModes:
     """Slowest modes: omega^2 or eigenvalues (k,) and shapes (n, k).
 
-    `complete` says whether no mode below the last one is missing; None if not counted.
+    `is_complete` says whether no mode below the last one is missing; None if not counted.
     """
 
     values: NDArray[Any]
     shapes: NDArray[Any]
-    complete: bool | None
+    is_complete: bool | None
 
 
 def undamped_modes(pencil: Pencil, count: int) -> LowestModes:

@@ -72,7 +72,7 @@ def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
             "output-left-out", f'output "{name}"', f"output {name} is not among the outputs: {why}",
             "name an output that has a linear form",
         )  # fmt: skip
-    if linear.model.packed.system.timed:
+    if linear.model.packed_scene.system.has_timed_loads:
         yield information(
             "time-dependent", RUN, f"loads depend on time: linearised at t = {linear.state.t:g} s",
             "give the time that is meant, t=...",
@@ -92,7 +92,7 @@ def find_response_risks(
         if risk.name in INPUT_RISKS and risk.element not in asked:
             continue
         if not (are_outputs_chosen and risk.name == OUTPUT_LEFT_OUT):
-            yield replace(risk, doubt=True) if risk.name == "unstable" else risk
+            yield replace(risk, invalidates=True) if risk.name == "unstable" else risk
 
 
 def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
@@ -109,7 +109,10 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
                 "the motion or with time", "look at a smaller part of the scene",
             )  # fmt: skip
         return
-    asked = (*linear.controls, *(() if linear.disturbances == GROUND else linear.others))
+    asked = (
+        *linear.input_channels,
+        *(() if linear.disturbance_names == GROUND else linear.disturbance_channels),
+    )
     changing = find_changes(linear, later, asked)
     if MATRICES in changing:
         yield Risk(
@@ -145,13 +148,13 @@ def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
         means = f"the state of t = {t:g} s {change}: {cause}, {leaving} moves {names}"
     return Risk(
         "unsteady-state", names, means, "take an equilibrium or a steady motion, or simulate",
-        abs(leaving.effort), None, leaving.unit, doubt=not leaving.is_small,
+        abs(leaving.effort), None, leaving.unit, invalidates=not leaving.is_small,
     )  # fmt: skip
 
 
 def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
     """Risks of inputs whose columns in `effects` (n, inputs) are zero."""
-    for name, column in zip(linear.inputs, effects.T, strict=True):
+    for name, column in zip(linear.input_names, effects.T, strict=True):
         if len(linear) and not column.any():
             yield information(
                 "input-without-effect", f'input "{name}"', f"input {name} has no effect here",
@@ -161,9 +164,9 @@ def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
 
 def is_unsteady(linear: LinearEquations) -> bool:
     """Whether closed loops are at an unsteady state, so that accelerations rotate rows."""
-    if linear.mechanism is None or find_departure(linear) is None:
+    if linear.constrained_motion is None or find_departure(linear) is None:
         return False
-    return not _balanced(linear, linear.mechanism.ways)
+    return not _balanced(linear, linear.constrained_motion.ways)
 
 
 def _balanced(linear: LinearEquations, ways: Array) -> bool:
@@ -172,7 +175,7 @@ def _balanced(linear: LinearEquations, ways: Array) -> bool:
     They are relative to the efforts that cancel.  Rounding may still move weakly constrained
     coordinates.
     """
-    state, tree = linear.state, linear.tree
-    efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.a, tree.start_memory())
+    state, tree = linear.state, linear.open_tree
+    efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.udot, tree.start_memory())
     left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
     return bool((left <= _CANCELLED * whole).all())

@@ -43,12 +43,12 @@ def assemble(
     branch: int | None = None,
 ) -> Assembly:
     """Nearest closed state, see `Model.assemble`; hinges `fast` keep their speeds (None: all)."""
-    hold, hinges = _held_hinges(compiled, hold), compiled.layout.hinges
+    hold, hinges = _held_hinges(compiled, hold), compiled.coordinate_layout.hinges
     if compiled.closed is None:
         return Assembly(compiled, t, q.copy(), u.copy())
     q, u = LoopCalls(compiled.looped, q, t=t).driven(q, u)
     moving = [
-        hinge.name for hinge in compiled.packed.described.hinge
+        hinge.name for hinge in compiled.packed_scene.described.hinge
         if not hinge.is_weld and hinge.drive is None and u[hinges[hinge.name].u_slice].any()
     ]  # fmt: skip
     if sum(hinges[name].nu for name in moving) > compiled.closed.loops.mobility:
@@ -58,7 +58,7 @@ def assemble(
         state = compiled.closed.nearest(q, u, hold, fast, t)
     else:
         start = compiled.closed.led(_branch_coordinates(compiled.closed, branch), q, hold, t)
-        state = compiled.closed.assembled(start, u, hold, fast, t)
+        state = compiled.closed.assemble(start, u, hold, fast, t)
     return Assembly(compiled, t, *state)
 
 
@@ -84,7 +84,7 @@ def _branch_coordinates(closed: LoopStart, number: int) -> Array:
 
 def _held_hinges(compiled: CompiledScene, hold: Sequence[str]) -> list[str]:
     """Names of the hinges in `hold`; raises SceneError for anything else."""
-    hinges, modal = compiled.layout.hinges, compiled.layout.modal
+    hinges, modal = compiled.coordinate_layout.hinges, compiled.coordinate_layout.modal
     if isinstance(hold, str) or not isinstance(hold, Collection):
         raise SceneError(f"hold = {hold!r:.60}: expected a list of names of hinges")
     for name in hold:

@@ -86,10 +86,14 @@ class EquilibriumSearch:
 
     def __init__(self, model: CompiledScene, t: float) -> None:
         self._model, self._t = model, t
-        mobility = len(model.free_speeds) if model.closed is None else model.closed.loops.mobility
+        mobility = (
+            len(model.free_speed_indices) if model.closed is None else model.closed.loops.mobility
+        )
         self._is_driven = mobility == 0  # drives and loops alone determine the state
         self._has_few_independent = mobility <= MAX_INDEPENDENT
-        self._is_small = mobility <= (_MAX_DENSE if model.freedom is None else _MAX_DENSE_LOOPS)
+        self._is_small = mobility <= (
+            _MAX_DENSE if model.independent_speeds is None else _MAX_DENSE_LOOPS
+        )
         self._light_search: _SweepSearch | None = None
         try:
             self._light_search = _SweepSearch(model, t, 1.0)
@@ -140,7 +144,7 @@ class EquilibriumSearch:
         At a singular configuration the loop loads, and with them the stiffness, are indeterminate,
         so that a negative stiffness along `motions` proves no instability.
         """
-        model, freedom, stiffness = self._model, self._model.freedom, search.stiffness
+        model, freedom, stiffness = self._model, self._model.independent_speeds, search.stiffness
         coordinates = _coordinates_of_speeds(model, list(range(model.nu)))
         if (
             freedom is None
@@ -149,7 +153,7 @@ class EquilibriumSearch:
             or not self._has_few_independent
         ):
             return False
-        if len(freedom.chosen(q)) <= model.closed.loops.mobility:
+        if len(freedom.select(q)) <= model.closed.loops.mobility:
             return False
         weights = np.random.default_rng(0).uniform(-1.0, 1.0, (_RANDOM_COUNT, len(motions)))
         resists, directions = list[bool](), [*motions, *(weights @ np.array(motions))]
@@ -188,7 +192,7 @@ class EquilibriumSearch:
                 raise
         remaining = max_steps - first_steps
         try:
-            heavy = _SweepSearch(model, self._t, float(len(model.free_speeds)))
+            heavy = _SweepSearch(model, self._t, float(len(model.free_speed_indices)))
             rest, _ = heavy.find(q, tolerance, remaining, progress)
             return light.find(rest, tolerance, remaining, progress)[0], True
         except NumericalFailure:
@@ -209,10 +213,10 @@ class EquilibriumSearch:
 
     def _find_by_differences(self, q: Array, tolerance: float) -> tuple[Array, Stability]:
         model = self._model
-        if model.freedom is not None:
-            problem = _mechanism_problem(model, model.freedom, q, self._t)
+        if model.independent_speeds is not None:
+            problem = _mechanism_problem(model, model.independent_speeds, q, self._t)
         else:
-            problem = _tree_problem(model, self._t, list(model.free_speeds))
+            problem = _tree_problem(model, self._t, list(model.free_speed_indices))
         rest = approached(problem, q, tolerance)
         self._difference_problem = problem = problem.at(rest)
         units = np.eye(model.nu)
@@ -225,13 +229,13 @@ class EquilibriumSearch:
 
         Returns the motion, the loads (nu,) at q and the number of states; else None.
         """
-        model, freedom = self._model, self._model.freedom
+        model, freedom = self._model, self._model.independent_speeds
         if self._is_driven or not self._has_few_independent:
             return None
         zeros = np.zeros(model.nu)
         try:
             if freedom is None:
-                problem = _tree_problem(model, self._t, list(model.free_speeds))
+                problem = _tree_problem(model, self._t, list(model.free_speed_indices))
             else:
                 problem = _mechanism_problem(model, freedom, q, self._t)
             problem = replace(problem, needed=self._efforts_in_inboard_axes(problem))
@@ -266,30 +270,42 @@ class EquilibriumSearch:
     def _axes_of_free_hinges(self, q: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
         """Indices of the velocity, and axes (3, 3) at q, of each free hinge of a tree."""
         model, engine, units = self._model, self._model.looped, np.eye(self._model.nu)
-        for slots in model.layout.hinges.values() if model.freedom is None else ():
+        for slots in (
+            model.coordinate_layout.hinges.values() if model.independent_speeds is None else ()
+        ):
             places = np.arange(slots.nu)[:3] + slots.u_slice.start
-            if slots.nu == 6 and not slots.straight and {*places} <= {*model.free_speeds}:
+            if (
+                slots.nu == 6
+                and not slots.rates_are_speeds
+                and {*places} <= {*model.free_speed_indices}
+            ):
                 rates = [engine.rates(self._t, q, units[j], engine.start_memory()) for j in places]
                 yield places, np.array(rates)[:, slots.q : slots.q + 3].T
 
     def residuals(self, q: Array) -> dict[str, float]:
         """Remaining efforts at an equilibrium by the names of speeds."""
-        model, freedom = self._model, self._model.freedom
+        model, freedom = self._model, self._model.independent_speeds
         if self._is_driven:
             return {}
         if self._light_search is None or self._difference_problem is not None:
             assert self._difference_problem is not None
             places, efforts = self._difference_problem.places, self._difference_problem.needed(q)
-            return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
+            return {
+                model.coordinate_layout.u_name(j): float(x)
+                for j, x in zip(places, efforts, strict=True)
+            }
         stiffness = self._light_search.stiffness
         if freedom is None or not self._has_few_independent:
             cut_speeds, missing = set(stiffness.own.tolist()), stiffness.residual(q)
-            places = tuple(j for j in model.free_speeds if j not in cut_speeds)
+            places = tuple(j for j in model.free_speed_indices if j not in cut_speeds)
             efforts = missing[list(places)]
         else:
-            places = freedom.chosen(q)
+            places = freedom.select(q)
             efforts = freedom.following(q, places).T @ stiffness.residual(q)
-        return {model.layout.u_name(j): float(x) for j, x in zip(places, efforts, strict=True)}
+        return {
+            model.coordinate_layout.u_name(j): float(x)
+            for j, x in zip(places, efforts, strict=True)
+        }
 
 
 def _count_steps(progress: Progress | None) -> Progress | None:
@@ -300,7 +316,7 @@ def _count_steps(progress: Progress | None) -> Progress | None:
 
 def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
     """Engine of the model with rotors on all hinges, of `weight` times the mass of the scene."""
-    packed = model.packed
+    packed = model.packed_scene
     rotors = weight * (total_mass(model) or 1.0) * (scene_length(model) / speed_scales(model)) ** 2
     engine = LoopedEngine(packed_system(with_rotors(packed.system, rotors.tolist()), packed))
     if model.closed is not None:
@@ -310,7 +326,7 @@ def _with_rotors(model: CompiledScene, weight: float) -> LoopedEngine:
 
 def _tree_problem(model: CompiledScene, t: float, free: list[int]) -> Rest:
     engine, zeros = model.looped, np.zeros(model.nu)
-    memory, quaternions = engine.start_memory(), model.layout.quaternions
+    memory, quaternions = engine.start_memory(), model.coordinate_layout.quaternions
     coordinates = _coordinates_of_speeds(model, free)
 
     def needed(q: Array) -> Array:
@@ -359,19 +375,19 @@ def _mechanism_problem(
         return problem
 
     def problem_at(places: tuple[int, ...], problem: Rest, q: Array) -> Rest:
-        chosen = freedom.chosen(q)
+        chosen = freedom.select(q)
         return problem if chosen == places else problem_along(chosen)
 
-    return problem_along(freedom.chosen(q))
+    return problem_along(freedom.select(q))
 
 
 def _coordinates_of_speeds(model: CompiledScene, free: list[int]) -> NDArray[np.int64] | None:
     """Indices in q of the coordinates whose rates are the free speeds; None for other hinges."""
     places = np.zeros(model.nu, dtype=np.int64)
-    for slots in model.layout.hinges.values():
-        if slots.nu and not slots.straight:
+    for slots in model.coordinate_layout.hinges.values():
+        if slots.nu and not slots.rates_are_speeds:
             return None
         places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
-    for slots in model.layout.modal.values():
+    for slots in model.coordinate_layout.modal.values():
         places[slots.u_slice] = np.arange(slots.q, slots.q + slots.nq)
     return np.asarray(places[free])

@@ -60,7 +60,7 @@ class KinematicQueries(CompiledScene):
 
     def _points(self, q: ArrayLike, of: Names) -> Array:
         lead, (states,) = batch(("q", q, self.nq))
-        return self._reshape(lead, of, self._kinematics.still(of, states))
+        return self._reshape(lead, of, self._kinematics.points_at_rest(of, states))
 
     def velocities(
         self, q: ArrayLike, u: ArrayLike, of: Names, *, out: Array | None = None
@@ -112,7 +112,7 @@ class KinematicQueries(CompiledScene):
             total = np.asarray(self._observe_sums(q, u, t)[..., SUMS["energy"][2]].sum(axis=-1))
         return copy_to(out, total)
 
-    def energies(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
+    def energy_components(self, q: ArrayLike, u: ArrayLike, t: ArrayLike = 0.0) -> dict[str, Array]:
         """Parts of `energy` by name, (...) each in J: kinetic, gravity, springs."""
         sums = self._observe_sums(q, u, t)
         return {
@@ -154,13 +154,13 @@ class KinematicQueries(CompiledScene):
     def _move(self, q: Array, u: Array, dt: float) -> Array:
         for first in self._quaternions:
             q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
-        engine = self.looped.inertia_alone
+        engine = self.looped.inertia_only
         rates = engine.rates(0.0, q, u, engine.start_memory())
         return move_steadily(q, rates, dt, self._quaternions)
 
     @cached_property
     def _quaternions(self) -> list[int]:
-        return [int(k) for group in self.layout.groups for k in group.quaternions()]
+        return [int(k) for group in self.coordinate_layout.groups for k in group.quaternions()]
 
     def _observe_sums(self, q: ArrayLike, u: ArrayLike, t: ArrayLike) -> Array:
         lead, given = batch(("t", t, None), ("q", q, self.nq), ("u", u, self.nu))
@@ -182,7 +182,9 @@ class KinematicQueries(CompiledScene):
     @cached_property
     def _quasi_speeds(self) -> list[int]:
         """Indices of speeds that are not rates of coordinates."""
-        hinges = (hinge for hinge in self.layout.hinges.values() if not hinge.straight)
+        hinges = (
+            hinge for hinge in self.coordinate_layout.hinges.values() if not hinge.rates_are_speeds
+        )
         return [place for hinge in hinges for place in range(hinge.u, hinge.u + hinge.nu)]
 
     @cached_property
@@ -206,11 +208,14 @@ class KinematicQueries(CompiledScene):
 
     @cached_property
     def _steady(self) -> bool:
-        return all(hinge.straight or hinge.steady for hinge in self.layout.hinges.values())
+        return all(
+            hinge.rates_are_speeds or hinge.constant_subspace
+            for hinge in self.coordinate_layout.hinges.values()
+        )
 
     @cached_property
     def _has_rate_speeds(self) -> bool:
-        return all(hinge.straight for hinge in self.layout.hinges.values())
+        return all(hinge.rates_are_speeds for hinge in self.coordinate_layout.hinges.values())
 
     def _differentiation(self, names: tuple[str, ...]) -> Differentiation:
         differentiation = self._differentiations.get(names)

@@ -29,7 +29,7 @@ def check_lasting(
     `linearise` returns the linear model about it.  Raises NumericalFailure if moving drives do not
     keep it at rest.
     """
-    if model.packed.system.steady or not len(equilibrium.residuals):
+    if model.packed_scene.system.is_autonomous or not len(equilibrium.residuals):
         return equilibrium
     earlier = equilibrium.findings
     if not _drives_move(model, equilibrium, t):
@@ -37,9 +37,9 @@ def check_lasting(
         return equilibrium
     risks = tuple(_risks(t, linearise))
     for risk in risks:
-        if risk.doubt:
+        if risk.invalidates:
             raise NumericalFailure(
-                f"no equilibrium: {risk.means}; simulate the motion, or stop the drives"
+                f"no equilibrium: {risk.description}; simulate the motion, or stop the drives"
             )
     equilibrium.findings = (*earlier, *risks)
     return equilibrium
@@ -47,7 +47,7 @@ def check_lasting(
 
 def _drives_move(model: CompiledScene, equilibrium: Equilibrium, t: float) -> bool:
     """Whether any drive has a speed or an acceleration at t (s)."""
-    system, engine = model.packed.system, model.looped
+    system, engine = model.packed_scene.system, model.looped
     y = SceneSystem(engine).start(t, np.asarray(equilibrium), np.zeros(model.nu))
     q, u = y[None, : model.nq].copy(), y[None, model.nq : model.nq + model.nu].copy()
     _, a = engine.accelerations(t, q, u, engine.start_memory()[None])

@@ -92,7 +92,7 @@ class LinearAnalysis(DynamicsQueries):
         """
         return self.linearize(q, u, t, friction=friction).modes(count, damped)
 
-    def exact_modes(
+    def dynamic_stiffness_modes(
         self,
         count: int,
         exact: Chosen = True,
@@ -103,7 +103,7 @@ class LinearAnalysis(DynamicsQueries):
 
         `exact` True for all beams, or the names of some.  See `Linear.exact_modes`.
         """
-        return self.linearize(q, None, t).exact_modes(count, exact)
+        return self.linearize(q, None, t).dynamic_stiffness_modes(count, exact)
 
     def frequency_response(
         self,
@@ -128,7 +128,7 @@ class LinearAnalysis(DynamicsQueries):
             omega, inputs, outputs, structural=structural, modal=modal, exact=exact
         )
 
-    def locus(
+    def root_locus(
         self,
         parameter: str,
         values: ArrayLike,
@@ -188,7 +188,7 @@ class LinearAnalysis(DynamicsQueries):
             self._linear_model_at(parameter, inputs=()), parameter, speeds, at, unbalance, observed
         )
 
-    def critical(
+    def stability_limit(
         self, parameter: str, stable: float, unstable: float, *, friction: Amplitudes = None
     ) -> StabilityLimit:
         """Parameter value at the stability limit, such as a buckling load or flutter speed.

@@ -44,13 +44,13 @@ class Model(LinearAnalysis, NotebookDisplay):
         return f"<Model: {self.scene.summary}, {self._mobility} degrees of freedom; {self.engine}>"
 
     def _repr_html_(self) -> str:
-        rows = [("degrees of freedom", self._mobility), ("engine", self.engine_choice)]
+        rows = [("degrees of freedom", self._mobility), ("engine", self.engine_reason)]
         return table(rows) + self.scene._repr_html_()
 
     @property
     def _mobility(self) -> int:
         """Number of degrees of freedom: free speeds, less those that loops constrain."""
-        return len(self.free_speeds) if self.closed is None else self.closed.loops.mobility
+        return len(self.free_speed_indices) if self.closed is None else self.closed.loops.mobility
 
     def initial_state(self) -> tuple[Array, Array]:
         """Initial state (q, u) of the scene at t = 0, with driven coordinates."""
@@ -73,7 +73,7 @@ class Model(LinearAnalysis, NotebookDisplay):
             return LoopAnalysis()
         return replace(
             self.closed.loops,
-            decided_by=self._independent_speed_names,
+            speed_choice=self._independent_speed_names,
             found_by=self._find_branches,
         )
 
@@ -82,8 +82,10 @@ class Model(LinearAnalysis, NotebookDisplay):
         return self.closed.branches
 
     def _independent_speed_names(self) -> tuple[str, ...]:
-        assert self.freedom is not None
-        return tuple(self.layout.u_name(place) for place in self.freedom.places)
+        assert self.independent_speeds is not None
+        return tuple(
+            self.coordinate_layout.u_name(place) for place in self.independent_speeds.places
+        )
 
     def assemble(
         self,
@@ -137,13 +139,13 @@ class Model(LinearAnalysis, NotebookDisplay):
         rows = batch(("q", q, self.nq))[1][0]
         return assemble_path(self, rows, hold, branch)
 
-    def refuse_undetermined_start(self) -> None:
+    def check_start_determined(self) -> None:
         """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
         from .undetermined_start import refuse_undetermined_start
 
         refuse_undetermined_start(self, *self.initial_state())
 
-    def refuse_unknown_outputs(self) -> None:
+    def check_outputs(self) -> None:
         """Raise SceneError for outputs and controller measurements that results do not have."""
         if self.scene.output or self.scene.controller:
             from ..result.scene_outputs import quantity_of
@@ -272,7 +274,7 @@ class Model(LinearAnalysis, NotebookDisplay):
         certify, resume = require_bool("certify", certify), require_bool("resume", resume)
         given = Control(method, step, rtol, atol)
         request = parse_error_request(error, error_of, given, checkpoint is not None or resume)
-        method, rtol, atol = given.filled()
+        method, rtol, atol = given.with_defaults()
         settings = validate(
             Settings(
                 t_end, t_start, method, step, rtol, atol, to_output_times(output_times), max_step,

@@ -120,7 +120,7 @@ def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
     Until 2026-11-24: whether a step of a scene with loops ended near a singular pose; until
     2026-11-29: which rows are at rest.  Older runs did not depend on them.
     """
-    system, rows = model.packed.system, run.memory
+    system, rows = model.packed_scene.system, run.memory
     missing = [system.strained] * (system.strained >= 0), [*system.chosen]
     for places in (missing[1], missing[0] + missing[1]):
         if places and rows.ndim == 2 and rows.shape[1] == system.n_memory - len(places):
@@ -132,11 +132,11 @@ def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
 
 def _fits(model: Model, run: Trajectory) -> bool:
     """Whether all arrays of a run have the sizes that the scene and the samples imply."""
-    n, memory = len(run.t), model.packed.system.n_memory
+    n, memory = len(run.t), model.packed_scene.system.n_memory
     expected = {
         "q": (n, model.nq), "u": (n, model.nu), "memory": (n, memory), "work": (n,), "event": (n,),
     }  # fmt: skip
-    states = [run.last[1:] if run.last is not None else None, run.start]
+    states = [run.last_state[1:] if run.last_state is not None else None, run.start]
     states_fit = all(
         (q.shape, u.shape) == ((model.nq,), (model.nu,)) for q, u in filter(None, states)
     )

@@ -66,13 +66,13 @@ class Session:
         risks: tuple[Risk, ...] = (),
     ) -> None:
         check_method(settings)
-        reject_one_way(model.packed, "a session")
+        reject_one_way(model.packed_scene, "a session")
         self.model, self.settings, self._risks = model, settings, risks
         self._names = settable_inputs(model)
-        self._packed = with_held_inputs(model.packed, self._names, settings.t_start)
+        self._packed = with_held_inputs(model.packed_scene, self._names, settings.t_start)
         self._code = code_for_any_length(model, settings)
         self._outputs: MeasuredOutputs | None = MeasuredOutputs(LoopedEngine(self._packed))
-        self._start_run(q, u, -math.inf if self._packed.goes_by_time else math.inf)
+        self._start_run(q, u, -math.inf if self._packed.is_time_dependent else math.inf)
 
     def _start_run(self, q: Array, u: Array, reach: float) -> None:
         """Start the integrator at (q, u); its breaks are known up to `reach` (s)."""
@@ -136,7 +136,7 @@ class Session:
             return SceneError(f'inputs["{self._names[index]}"] = {value}: expected a finite number')
         if index == -1:
             return SceneError(f"dt = {dt!r}: expected a time in s, 0 or more")
-        return SceneError(f"the session was {self.stopped}; make a new one, or copy it before")
+        return SceneError(f"the session was {self.stop_reason}; make a new one, or copy it before")
 
     def _input_rejection(self, inputs: Any) -> SceneError:
         self._reset_new_inputs()
@@ -221,7 +221,7 @@ class Session:
         return dict(zip(self._names, map(float, self._input_values()), strict=True))
 
     @property
-    def stopped(self) -> str:
+    def stop_reason(self) -> str:
         """Reason why an event ended the session; "" while it runs."""
         return stop_message(self._system, self._run) if self._run.status is Status.STOPPED else ""
 
@@ -240,7 +240,7 @@ class Session:
     def result(self) -> Result:
         """Current state as a result of one sample, with all quantities of the scene."""
         model, run = self._current_model(), self._run
-        memory = self._system.memory[None, : model.packed.system.n_memory].copy()
+        memory = self._system.memory[None, : model.packed_scene.system.n_memory].copy()
         samples = Samples(np.array([run.t]), run.y[None], memory, np.zeros(1, dtype=np.int64))
         settings = replace(self.settings, t_end=run.t, output_times=None)
         trajectory = split(
@@ -256,7 +256,7 @@ class Session:
 
     def _current_model(self) -> CompiledScene:
         """Model with the current inputs."""
-        return self.model.renewed(with_input_values(self.model.packed, self.inputs))
+        return self.model.with_packed_scene(with_input_values(self.model.packed_scene, self.inputs))
 
     def copy(self) -> Self:
         """Independent session at the same state, with the same settings and inputs."""
@@ -279,7 +279,7 @@ class Session:
         )
 
     def __repr__(self) -> str:
-        return f"<Session: t = {self.t:.9g} s{self.stopped and ', '}{self.stopped}>"
+        return f"<Session: t = {self.t:.9g} s{self.stop_reason and ', '}{self.stop_reason}>"
 
 
 def step_risks(model: CompiledScene, settings: Settings, q: Array, u: Array) -> tuple[Risk, ...]:
@@ -307,7 +307,9 @@ def settable_inputs(model: CompiledScene) -> tuple[str, ...]:
     """
     drives = [active for active in active_expressions(model.scene) if active.drive]
     drive_inputs = {name for active in drives for name in active.inputs}
-    time_dependent = {name for name, number in model.packed.channels.items() if not number.stands}
+    time_dependent = {
+        name for name, number in model.packed_scene.channels.items() if not number.stands
+    }
     excluded = {*drive_inputs, *model.scene.controlled, *time_dependent}
     return tuple(entry.name for entry in model.scene.input if entry.name not in excluded)
 

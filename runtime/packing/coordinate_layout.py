@@ -36,9 +36,9 @@ class HingeSlots:
     Attributes:
         q, u: first index in q and in u.
         quaternion: first quaternion entry within the hinge, None without one.
-        straight: whether the speeds are the rates of the coordinates.
-        steady: whether the motion subspace is constant in the outboard body.
-        turning: whether it is constant and purely rotational.
+        rates_are_speeds: whether the speeds are the rates of the coordinates.
+        constant_subspace: whether the motion subspace is constant in the outboard body.
+        rotation_speeds: whether it is constant and purely rotational.
     """
 
     name: str
@@ -50,9 +50,9 @@ class HingeSlots:
     u_names: tuple[str, ...]
     u_units: tuple[str, ...]
     quaternion: int | None
-    straight: bool
-    steady: bool
-    turning: bool
+    rates_are_speeds: bool
+    constant_subspace: bool
+    rotation_speeds: bool
 
     @property
     def nq(self) -> int:
@@ -169,7 +169,8 @@ class Layout:
         return HingeSlots(
             self._numbers.name(hinge), slots.type, slots.q + repeats * group.nq,
             slots.u + repeats * group.nu, slots.q_names, slots.q_units, slots.u_names,
-            slots.u_units, slots.quaternion, slots.straight, slots.steady, slots.turning,
+            slots.u_units, slots.quaternion, slots.rates_are_speeds, slots.constant_subspace,
+            slots.rotation_speeds,
         )  # fmt: skip
 
     @cached_property
@@ -206,7 +207,7 @@ class Layout:
                 yield replace(slots, name=_user_name(slots.name))
         yield from self.modal.values()
 
-    def along(self, constraint: str) -> HingeSlots:
+    def curve_slots(self, constraint: str) -> HingeSlots:
         """Slots of the curve parameter of a constraint."""
         internal_slots = (self.slots(number) for number in self.internal)
         name = f"{constraint}{OF_CONSTRAINT}"

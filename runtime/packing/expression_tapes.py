@@ -92,7 +92,7 @@ def resolver(
             _check_index(name, hinge, index, slots.q_names if quantity == "q" else slots.u_names)
             return graph.element(quantity, first + index)
         if quantity in CURVE_QUANTITIES and name.owner:
-            slots, port = layout.along(name.owner), "qu"[CURVE_QUANTITIES.index(quantity)]
+            slots, port = layout.curve_slots(name.owner), "qu"[CURVE_QUANTITIES.index(quantity)]
             return graph.element(port, getattr(slots, port))
         if quantity in ("q", "u") and length:
             return graph.element("length", 0 if quantity == "q" else 1)

@@ -74,9 +74,9 @@ def load_coupling(system: System) -> Reach:
             watched.setdefault(body, set()).update(sides, bodies)
     across = tuple(sorted(watched.keys() - {GROUND}))
     return Reach(
-        loads, tuple(forces), _with_inboard_bodies(system, own | set(system.dragged)), across,
-        tuple(frozenset(watched[body] - {GROUND}) for body in across),
-        efforts, tuple(value_readings[value] for value, _ in efforts),
+        loads, tuple(forces), _with_inboard_bodies(system, own | set(system.bodies_with_drag)),
+        across, tuple(frozenset(watched[body] - {GROUND}) for body in across), efforts,
+        tuple(value_readings[value] for value, _ in efforts),
     )  # fmt: skip
 
 

@@ -57,8 +57,8 @@ def _slots(
     assert facts is not None  # `get` has rejected unknown types
     return HingeSlots(
         hinge.name, hinge.type, q, u, *_names_and_units(facts.coordinates),
-        *_names_and_units(facts.speeds), facts.quaternion, facts.straight, facts.steady,
-        facts.steady and not facts.slides,
+        *_names_and_units(facts.speeds), facts.quaternion, facts.straight, facts.constant_subspace,
+        facts.constant_subspace and not facts.slides,
     )  # fmt: skip
 
 

@@ -82,12 +82,12 @@ class PackedScene(Frames):
             return self._slopes
 
     @cached_property
-    def watched(self) -> Watched:
+    def event_functions(self) -> Watched:
         """Tape of the event functions: events, releases and switches."""
         return event_order(self.scene, self.layout, self.held)
 
     @cached_property
-    def goes_by_time(self) -> bool:
+    def is_time_dependent(self) -> bool:
         """Whether times of step ends or step limits may be known before a run."""
         return bool(self.scene.controller) or any(
             active.inputs or active.drive or "t" in {name.text for name in active.expression.names}

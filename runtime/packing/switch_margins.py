@@ -119,7 +119,7 @@ def _switching_terms(active: ActiveExpression) -> list[int]:
         of_time |= set(order) - set(moving)
     return [
         number
-        for number in sorted(expression.needed - of_time)
+        for number in sorted(expression.required_terms - of_time)
         if expression.terms[number].op in SWITCHES
         and not (active.condition and number == expression.root)
     ]

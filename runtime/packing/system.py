@@ -398,20 +398,20 @@ class System:
         return self.bodies[-1].place + self.bodies[-1].count if self.bodies else 0
 
     @property
-    def dragged(self) -> list[int]:
+    def bodies_with_drag(self) -> list[int]:
         """Positions of the flexible bodies with viscous drag."""
         has_drag = self.rows(lambda body: body.modal is not None and body.modal.drag is not None)
         return [int(place) for place in np.flatnonzero(has_drag)]
 
     @property
-    def steady(self) -> bool:
+    def is_autonomous(self) -> bool:
         """Whether nothing depends on time: drives, expressions, couplings and force elements."""
         unknown_elements = any(force.element not in _TIME_INDEPENDENT for force in self.forces)
         timed_coupling = self.coupled is not None and reads_port(self.coupled, "t")
-        return not (self.driven or self.timed or unknown_elements or timed_coupling)
+        return not (self.driven or self.has_timed_loads or unknown_elements or timed_coupling)
 
     @property
-    def timed(self) -> bool:
+    def has_timed_loads(self) -> bool:
         """Whether an expression of an effort or load depends on time."""
         kernels = [self.values, *(force.effort for force in self.forces)]
         reads_time = any(kernel is not None and reads_port(kernel, "t") for kernel in kernels)

@@ -96,7 +96,7 @@ def system_of(
     frames = Frames(
         nodes, tree, layout, elements, releases, Lookup(nodes.bodies, bodies.placement),
         Lookup(nodes.bodies, tree.place_of_body), Lookup(nodes.hinges, tree.place_of_hinge),
-        expanded, (*carried.told(nodes), *simplifications), simplify,
+        expanded, (*carried.simplifications(nodes), *simplifications), simplify,
     )  # fmt: skip
     ports = [Port(MOVING, (1 + max(moving),))] if moving else []
     driven, values = list(_driven_coordinates(nodes, tree)), Values(layout, ports)

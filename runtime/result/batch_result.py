@@ -46,7 +46,7 @@ class BatchRun(Record):
         """Raise SceneError: runs of a batch have no certificate."""
         raise SceneError("runs of a batch have no certificate; simulate this one alone")
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Default quantities of a plot."""
         return default_candidates(self)
 
@@ -64,14 +64,14 @@ class BatchResult(AssessedAnswer, BatchData):
         for k in np.flatnonzero(~np.asarray(self.success)).tolist():
             yield Risk(
                 "run-failed", f"run {k}", f"run {k} failed: {self.messages[k]}",
-                "simulate it alone", figure=k,
+                "simulate it alone", value=k,
             )  # fmt: skip
         yield Risk(
             "unexamined", RUN, "runs of a batch are not examined: their balances and errors are "
             "unknown", "simulate single runs with certify=True",
         )  # fmt: skip
 
-    def run(self, k: int) -> BatchRun:
+    def result(self, k: int) -> BatchRun:
         """Run k with its own model, as a result with names and quantities but no certificate.
 
         Raises SceneError for an invalid index, and for models with one-way bodies.
@@ -83,7 +83,7 @@ class BatchResult(AssessedAnswer, BatchData):
             raise SceneError(f"run = {k}: expected {expected}")
         k %= count
         model, reached = self.models.of(k), self._reached(k)
-        expanded = model.packed.expanded
+        expanded = model.packed_scene.expanded
         rigid = None if expanded is None else expanded.rigidified
         if rigid is not None and rigid.one_way:
             raise SceneError(
@@ -108,9 +108,11 @@ class BatchResult(AssessedAnswer, BatchData):
         )
         return BatchRun(model, trajectory)
 
-    def names(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """Names accepted by `quantity` and `plot`."""
-        return tuple(name for name in self.run(0).names() if name not in _ABSENT_QUANTITIES)
+        return tuple(
+            name for name in self.result(0).quantity_names() if name not in _ABSENT_QUANTITIES
+        )
 
     def quantity(self, name: str) -> Quantity:
         """Values (n, m) or (n, m, k) with unit; SceneError with the nearest name if unknown."""
@@ -126,13 +128,13 @@ class BatchResult(AssessedAnswer, BatchData):
             import xarray
         except ImportError as error:
             raise missing_package_error("io", "an xarray Dataset", error) from None
-        first = self.run(0)
+        first = self.result(0)
         variables, labels = xarray_dataset.dataset_variables(first)
         labels["time"] = (labels["time"][0], self.t, labels["time"][2])
         stacked: dict[str, Any] = {}
         for k in range(len(self.q)):
             run_variables, reached = (
-                xarray_dataset.dataset_variables(self.run(k))[0] if k else variables,
+                xarray_dataset.dataset_variables(self.result(k))[0] if k else variables,
                 self._reached(k),
             )
             for name, (dims, values, attributes) in run_variables.items():
@@ -188,14 +190,16 @@ class BatchResult(AssessedAnswer, BatchData):
         if band if band is not None else len(self.q) > _MAX_LINES:
             figure = compose_panels(self._bands(selection, run_indices), title, ax)
         else:
-            figure = draw_runs({f"run {k}": self.run(k) for k in run_indices}, selection, title, ax)
+            figure = draw_runs(
+                {f"run {k}": self.result(k) for k in run_indices}, selection, title, ax
+            )
         if path is not None:
             figure.write(Path(path))
         return figure.figure
 
     def _bands(self, wanted: PlotSelection, there: Sequence[int]) -> list[Panel]:
         longest = max(there, key=lambda k: self._reached(k).sum())
-        panel_list = build_panels({"run": self.run(longest)}, wanted)
+        panel_list = build_panels({"run": self.result(longest)}, wanted)
         quantities = iter(self._quantities([name for panel in panel_list for name in panel.names]))
         band_label = (
             f"median and {_BAND_PERCENTILES[0]:g} to {_BAND_PERCENTILES[1]:g} % of "
@@ -221,7 +225,7 @@ class BatchResult(AssessedAnswer, BatchData):
         templates: list[Quantity] = []
         values: list[Array] = []
         for k in range(len(self.q)):
-            run, reached = self.run(k), self._reached(k)
+            run, reached = self.result(k), self._reached(k)
             quantities = [run.quantity(name) for name in names]
             if not k:
                 templates = quantities

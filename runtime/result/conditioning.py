@@ -10,13 +10,14 @@ accelerations is about 1e-16 times the propagated rounding in D over D.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
+from mstmm.plain_data import stored_as
 from mstmm.risk import Risk
 
 from .flexible.modal_pivots import ModalPivots
@@ -57,24 +58,24 @@ class PivotLoss:
     ratio: float
     hinge: str
     time: float
-    refines: int = 0
+    is_refined: int = field(default=0, metadata=stored_as("refines"))
 
     @property
     def error(self) -> float:
         """Relative error of the accelerations; each refinement multiplies it by the initial one."""
-        return min(1e-16 * self.ratio, 1.0) ** (1 + self.refines)
+        return min(1e-16 * self.ratio, 1.0) ** (1 + self.is_refined)
 
     @property
     def sweep(self) -> str:
         """Name of the sweep that avoids this loss of digits."""
-        return "qr" if self.refines or self.ratio > MAX_REFINED_LOSS else "refined"
+        return "qr" if self.is_refined or self.ratio > MAX_REFINED_LOSS else "refined"
 
     @property
     def risk(self) -> Risk | None:
         """Finding that digits are lost; None for a loss up to `MAX_PIVOT_LOSS`."""
         if not self.error > 1e-16 * MAX_PIVOT_LOSS:
             return None
-        refined = f", refined {self.refines} times" if self.refines else ""
+        refined = f", refined {self.is_refined} times" if self.is_refined else ""
         return Risk(
             "pivot-loss", f'hinge "{self.hinge}"',
             f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
@@ -95,7 +96,7 @@ class SingularDistance:
     measure: float
     hinge: str
     time: float
-    turned: float = 0.0
+    rotation_per_step: float = field(default=0.0, metadata=stored_as("turned"))
 
     @property
     def risk(self) -> Risk | None:
@@ -113,12 +114,12 @@ class SingularDistance:
                 self.measure,
                 MIN_SINGULAR_MEASURE,
             )
-        if self.measure < NEAR_SINGULAR_MEASURE and self.turned > MAX_STEP_ANGLE:
+        if self.measure < NEAR_SINGULAR_MEASURE and self.rotation_per_step > MAX_STEP_ANGLE:
             return Risk(
                 "gimbal", f'hinge "{self.hinge}"',
-                f"{approach}, and its angles change there by {self.turned:.2g} rad within a step",
-                "use a ball hinge, or a method that chooses its steps", self.turned, MAX_STEP_ANGLE,
-                "rad",
+                f"{approach}, and its angles change there by {self.rotation_per_step:.2g} rad "
+                f"within a step", "use a ball hinge, or a method that chooses its steps",
+                self.rotation_per_step, MAX_STEP_ANGLE, "rad",
             )  # fmt: skip
         return None
 
@@ -136,12 +137,12 @@ def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
         not len(run.t)
         or not model.nu
         or len(model.scene.bodies) > MAX_CHECKED_BODIES
-        or model.packed.qr
+        or model.packed_scene.qr
     ):
         return None
-    if model.packed.system.closes:
+    if model.packed_scene.system.closes:
         return None
-    refines = int(model.packed.model.refines)
+    refines = int(model.packed_scene.model.refines)
     worst, pivots = PivotLoss(0.0, "", 0.0, refines), _PivotRatios(model)
     count = int(np.clip(_MAX_BODY_SAMPLES // len(pivots.parents), 1, MAX_PIVOT_SAMPLES))
     for k in np.unique(np.linspace(0, len(run.t) - 1, count).astype(int)):
@@ -166,7 +167,7 @@ class _PivotRatios:
     """Offsets of inertias and motion subspaces of all n bodies in the workspace."""
 
     def __init__(self, model: CompiledScene) -> None:
-        packed, lib = model.packed, model.looped.lib
+        packed, lib = model.packed_scene, model.looped.lib
         system = packed.system
         self.parents = system.parents
         speeds = system.rows(lambda body: body.nu)[:, None]
@@ -241,7 +242,7 @@ def may_be_singular(model: CompiledScene) -> bool:
     """Whether any hinge has a coordinate singularity."""
     return any(
         _singularity_kernel(model, group.first + k) is not None
-        for group in model.layout.groups
+        for group in model.coordinate_layout.groups
         for k in range(min(group.count, len(group.hinges)))
     )
 
@@ -252,7 +253,7 @@ def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance
     A change of sign between two samples counts as zero: the coordinates failed in between.
     """
     distances: list[SingularDistance] = []
-    for group in model.layout.groups:
+    for group in model.coordinate_layout.groups:
         for k in range(min(group.count, len(group.hinges))):
             kernel = _singularity_kernel(model, group.first + k)
             if kernel is None:
@@ -274,15 +275,15 @@ def _smallest_distance(
         k, value = int(changes[0]), 0.0
         part = measures[k] / (measures[k] - measures[k + 1])
         time = float(run.t[k] + part * (run.t[k + 1] - run.t[k]))
-    speeds = np.abs(run.u[:, model.layout.slots(number).u_slice])
+    speeds = np.abs(run.u[:, model.coordinate_layout.slots(number).u_slice])
     angle_per_step = (run.settings.step or 0.0) * float(np.nanmax(speeds, initial=0.0))
-    name = model.packed.scene.hinges.name(number)
+    name = model.packed_scene.scene.hinges.name(number)
     return SingularDistance(value, name, time, angle_per_step)
 
 
 def _singularity_kernel(model: CompiledScene, number: int) -> Any:
     """Kernel `singularity` of a hinge's type, None if it has none."""
-    packed = model.packed
+    packed = model.packed_scene
     if not packed.layout.slots(number).nq:
         return None
     body = packed.system.body(packed.topology.place_of_hinge(number))
@@ -294,7 +295,7 @@ def _singularity_kernel(model: CompiledScene, number: int) -> Any:
 
 def _singularity_measures(model: CompiledScene, run: Trajectory, number: int, call: Any) -> Array:
     """Singularity measure of one hinge at every sample."""
-    packed = model.packed
+    packed = model.packed_scene
     ffi, slots = packed.ffi, packed.layout.slots(number)
     p = packed.system.body(packed.topology.place_of_hinge(number)).hinge_p or (0.0,)
     coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])

@@ -56,7 +56,7 @@ def energy_drift(result: Record) -> Drift:
     In static equilibrium no energy is exchanged: the scale is then a fraction of the stored energy,
     or the energy of gravity due to rounding of positions.
     """
-    parts, work = result.energies(), result.work
+    parts, work = result.energy_components(), result.work
     with np.errstate(all="ignore"):  # the residual shows an overflow
         residual = sum(parts.values(), -work)
         overflows = any(np.isinf(part).any() for part in (*parts.values(), work))
@@ -87,7 +87,7 @@ def momentum_drifts(result: Record) -> list[Drift]:
     and the larger of the largest angular momentum and that times the extent of the scene.
     """
     scene, drifts = result.model.scene, list[Drift]()
-    flexible = result.model.flexible
+    flexible = result.model.flexible_bodies
     has_drag = any(body.drag is not None for body in flexible.values())
     if not len(result.t) or has_drag or not _is_isolated(scene):
         return drifts
@@ -98,7 +98,7 @@ def momentum_drifts(result: Record) -> list[Drift]:
     reach = max((_max_abs(result.position(name)) for name in names), default=0.0)
     pivot, pivot_label = _momentum_pivot(result, reach)
     reach = max((_max_abs(result.position(name) - pivot) for name in names), default=0.0)
-    kinetic = _max_abs(result.energies()["kinetic"])
+    kinetic = _max_abs(result.energy_components()["kinetic"])
     mass = total_mass(result.model)
     linear, angular = result.momentum(), result.angular_momentum()
     angular = angular - np.cross(pivot, linear)
@@ -110,7 +110,7 @@ def momentum_drifts(result: Record) -> list[Drift]:
         result, _ground_hinges(scene), pivot, is_conserved.ravel()
     ).reshape(2, 3)
     speed = np.sqrt(
-        2 * max(kinetic, _STORED_ENERGY_RATIO * _max_stored_energy(result.energies()))
+        2 * max(kinetic, _STORED_ENERGY_RATIO * _max_stored_energy(result.energy_components()))
     ) * np.sqrt(mass)
     scale = max(_max_abs(np.linalg.norm(angular, axis=1)), speed * reach)
     for k, axis in enumerate("xyz"):

@@ -38,7 +38,7 @@ class Measure(ABC):
         """Read the compared values (n, k) of a run at its samples."""
 
     @abstractmethod
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         """Distances (n,) of two runs from their values (n, k)."""
 
     def scale_by(self, numbers: Array) -> None:  # noqa: B027 - most measures need no reference
@@ -55,7 +55,7 @@ class Coordinates(Measure):
     )
 
     def __init__(self, model: CompiledScene) -> None:
-        self._layout = model.layout
+        self._layout = model.coordinate_layout
         self._sizes: dict[str, float] = {}
 
     def read(self, result: Record) -> Array:
@@ -70,7 +70,7 @@ class Coordinates(Measure):
         excursion_by_unit = excursions(self._layout, numbers, but="rad")
         self._sizes = {unit: size or 1.0 for unit, size in excursion_by_unit.items()}
 
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         distances = np.zeros(len(a))
         for unit, difference in differences(self._layout, a, b, "q"):
             distances = np.maximum(distances, difference / self._sizes.get(unit, 1.0))
@@ -104,7 +104,7 @@ class Quantities(Measure):
             start = np.broadcast_to(numbers[:1], numbers.shape)
             self._sizes = [float(distance.max()) or 1.0 for distance in self._ways(numbers, start)]
 
-    def apart(self, a: Array, b: Array) -> Array:
+    def distance(self, a: Array, b: Array) -> Array:
         distances = self._ways(a, b)
         return np.max(
             [distance / scale for distance, scale in zip(distances, self._sizes, strict=True)],

@@ -54,7 +54,7 @@ def has_impacts(result: Record) -> bool:
 
 def _impact_samples(result: Record) -> list[tuple[int, int]] | None:
     """Pairs (sample, event) of all impacts; None if samples may not show all of them."""
-    bounce_events = {bounce.event for bounce in result.model.packed.watched.bounces}
+    bounce_events = {bounce.event for bounce in result.model.packed_scene.event_functions.bounces}
     rows = np.flatnonzero(result.event > 0).tolist()
     statistics = result.statistics
     if bounce_events and (statistics is None or len(rows) < statistics.events):
@@ -67,7 +67,7 @@ class _RigidScene:
 
     def __init__(self, result: Record, roots: Sequence[Hinge], pivot: Array) -> None:
         self._result, self._system = result, SceneSystem(result.model.looped)
-        self._speeds = [result.layout(hinge.name).u_slice for hinge in roots]
+        self._speeds = [result.coordinate_info(hinge.name).u_slice for hinge in roots]
         self._names = [hinge.outboard for hinge in roots]
         self._arms = [result.position(name) - pivot for name in self._names]
         references = result._observed.references

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
+from mstmm.plain_data import stored_as
 
 from ..engine.loops.loop_analysis import NEGLIGIBLE_MISFIT
 from ..engine.loops.loop_calls import LoopCalls
@@ -37,25 +38,25 @@ class Closure:
     """Largest position gap (m, rad) and velocity error (m/s, rad/s) of the loops of a run.
 
     Over the checked samples. Also describes the number of independent rows, the redundant rows, and
-    the components of indeterminate reactions. Steps `on_positions` leave velocity errors of the
+    the components of indeterminate reactions. Steps `position_level` leave velocity errors of the
     size of their errors. `misfit` is the largest gap (m, rad) of a redundant row if it exceeds
     rounding, else 0, and `misfit_loop` is the name of its loop.
     """
 
     gap: float
     slip: float
-    counted: str = ""
-    repeated: str = ""
+    summary: str = field(default="", metadata=stored_as("counted"))
+    redundant_text: str = field(default="", metadata=stored_as("repeated"))
     open_loads: str = ""
-    on_positions: bool = False
+    position_level: bool = field(default=False, metadata=stored_as("on_positions"))
     misfit: float = 0.0
     misfit_loop: str = ""
 
     def __str__(self) -> str:
         text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
-        text += ", which steps on positions leave" if self.on_positions else ""
+        text += ", which steps on positions leave" if self.position_level else ""
         notes = (
-            ("", self.counted), ("repeat others: ", self.repeated),
+            ("", self.summary), ("repeat others: ", self.redundant_text),
             ("loads left open: ", self.open_loads),
         )  # fmt: skip
         return "; ".join((text, *(title + words for title, words in notes if words)))
@@ -70,12 +71,12 @@ def loop_closure(model: CompiledScene, run: Trajectory) -> Closure | None:
         return None
     calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
     misfit, misfit_loop = (
-        NEGLIGIBLE_MISFIT * LOCKED * characteristic_length(model.packed.system),
+        NEGLIGIBLE_MISFIT * LOCKED * characteristic_length(model.packed_scene.system),
         "",
     )
     for k in np.unique(np.linspace(0, len(run.t) - 1, _MAX_SAMPLES).astype(int)):
         q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
-        if model.packed.releases:
+        if model.packed_scene.releases:
             calls.memory = np.array(run.memory[k])
         gaps = _residuals(calls, calls.gap, q, u, t)
         redundant_gaps = np.where(calls.inverses() > 0, 0.0, gaps)
@@ -87,8 +88,8 @@ def loop_closure(model: CompiledScene, run: Trajectory) -> Closure | None:
     on_positions = run.settings.method.endswith(INDEX3_SUFFIX)
     loops = model.closed.loops
     return Closure(
-        gap, slip, loops.counted, loops.repeated(_MAX_NAMED_ROWS), loops.open_loads, on_positions,
-        misfit if misfit_loop else 0.0, misfit_loop,
+        gap, slip, loops.summary, loops.redundant_text(_MAX_NAMED_ROWS), loops.indeterminate_text,
+        on_positions, misfit if misfit_loop else 0.0, misfit_loop,
     )  # fmt: skip
 
 

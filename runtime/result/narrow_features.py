@@ -116,7 +116,7 @@ def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory |
     if run.statistics.steps > _MAX_RERUN_STEPS:
         return None
     _, q, u = run.first
-    t_end = run.settings.t_end if run.last is None else run.last[0]
+    t_end = run.settings.t_end if run.last_state is None else run.last_state[0]
     settings = replace(run.settings, t_end=t_end, output_times=None)
     rerun = first_run(model, settings, q, u, RunMonitor(None, settings))
     return replace(rerun, start=(q, u)) if rerun.is_comparable else None
@@ -202,7 +202,7 @@ def _time_candidates(
 def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
     """Terms that may have peaks; an angle only jumps, at half a turn."""
     terms = view.expression.terms
-    return [watched for watched in view.watched() if terms[watched.term].op != "atan2"]
+    return [watched for watched in view.narrow_candidates() if terms[watched.term].op != "atan2"]
 
 
 def _function_ranges(
@@ -284,7 +284,7 @@ def _distinct_states(run: Trajectory) -> RunStates | None:
     """States of a run at distinct times, the last of each; None for fewer than two."""
     t, q, u = _all_states(run)
     memory = run.memory
-    if run.start is not None and run.last is not None and len(memory):
+    if run.start is not None and run.last_state is not None and len(memory):
         memory = np.concatenate([memory[:1], memory, memory[-1:]])
     if len(t) < 2 or len(memory) != len(t) or not (np.isfinite(q).all() and np.isfinite(u).all()):
         return None
@@ -304,8 +304,8 @@ def _max_step(run: Trajectory) -> float:
 def _all_states(run: Trajectory) -> tuple[Array, Array, Array]:
     """Times, coordinates and speeds (t, q, u) at the start, the samples and the end."""
     t, q, u = run.t, run.q, run.u
-    if run.start is not None and run.last is not None:
-        (end, *last), first = run.last, (run.settings.t_start, *run.start)
+    if run.start is not None and run.last_state is not None:
+        (end, *last), first = run.last_state, (run.settings.t_start, *run.start)
         rows = zip(first, (t, q, u), (end, *last), strict=True)
         t, q, u = (np.concatenate([np.asarray(a)[None], x, np.asarray(b)[None]])
                    for a, x, b in rows)  # fmt: skip
@@ -331,11 +331,11 @@ def _coordinate_path(
     hinge = name.hinge or ("" if own is None else own.name)
     if name.quantity != "q" or not hinge:
         return None
-    slots, index = model.layout.hinges[hinge], name.index or 0
+    slots, index = model.coordinate_layout.hinges[hinge], name.index or 0
     t, q, u = _all_states(run)
     ends = q[:, slots.q + index]
     values = np.stack([ends[:-1], ends[1:]])
-    if slots.straight:
+    if slots.rates_are_speeds:
         values = _cubic_values(np.diff(t), ends, u[:, slots.u + index])
     distance = np.abs(np.diff(values, axis=0)).sum(axis=0)
     return _SampledPath(
@@ -361,7 +361,7 @@ def _first_missed_peak(
 ) -> tuple[float, float, float] | None:
     """First missed peak: (position, length of steps there, required length)."""
     low, high = float(path.least.min()), float(path.most.max())
-    watched = _peaked_terms(view) if path.ranges else view.watched()
+    watched = _peaked_terms(view) if path.ranges else view.narrow_candidates()
     if not high > low or not watched:
         return None
     edges = path.ends if path.ranges else None

@@ -131,11 +131,11 @@ class Quantities:
         """Quantity of this name; SceneError with the nearest name if there is none."""
         if not isinstance(name, str):
             raise SceneError(f"quantity {name!r}: expected a name, such as energy")
-        for full_name in self._named.meant(name):
+        for full_name in self._named.resolve(name):
             if (entry := self._entry(full_name)) is not None:
                 return entry() if full_name == name else replace(entry(), name=name)
         owners = [
-            one for full_name in self._named.meant(name) for one in self._owners_in(full_name)
+            one for full_name in self._named.resolve(name) for one in self._owners_in(full_name)
         ]
         known_names = [n for owner in owners for n in self.of(owner).entries]
         hint = did_you_mean(name, (*known_names, *self._every()))

@@ -16,7 +16,7 @@ Values = Callable[[], Array]
 class Quantity:
     """Values (n,) or (n, k) over time; `labels` has one entry per column.
 
-    `rates` are their time derivatives if these are also quantities. `what` is the noun of an
+    `rates` are their time derivatives if these are also quantities. `description` is the noun of an
     `owner`: "angle" of "hinge elbow"; "" without an owner. `note` is a sentence for readers.
     """
 
@@ -26,7 +26,7 @@ class Quantity:
     long_name: str
     labels: tuple[str, ...] = ()
     rates: Callable[[], Array] | None = field(default=None, compare=False)
-    what: str = ""
+    description: str = ""
     owner: str = ""
     note: str = ""
 

@@ -56,7 +56,7 @@ class Result(Record, NotebookDisplay):
 
         return build_certificate(self, self._error)
 
-    def pictures(self) -> tuple[str, ...]:
+    def picture_names(self) -> tuple[str, ...]:
         """Names of the shape panels that `plot` accepts.
 
         "shape" (all flexible bodies), "blade.shape", "blade.deflection" (along the beam),
@@ -66,7 +66,7 @@ class Result(Record, NotebookDisplay):
 
         return tuple(panel_names(self))
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Default quantities of `plot` and `table`."""
         from .plotting.default_quantities import default_candidates
 
@@ -178,7 +178,7 @@ class Result(Record, NotebookDisplay):
     def _repr_html_(self) -> str:
         certificate = self.certificate
         samples = f"{len(self.t)}, t = {self.t[0]:g} to {self.t[-1]:g} s" if len(self.t) else "none"
-        rows = [("samples", samples), ("method", self.settings.method), *certificate.rows()]
+        rows = [("samples", samples), ("method", self.settings.method), *certificate.as_pairs()]
         return table(rows)
 
     def __repr__(self) -> str:

@@ -94,7 +94,7 @@ class Record(FlexibleResults, ABC):
         if not unusable or not self.trajectory.is_comparable:
             return text
         text = f"{text}, but {unusable}"
-        return text if self._step is None else self._step.blamed(text)
+        return text if self._step is None else self._step.explain_failure(text)
 
     @cached_property
     def _step(self) -> StepCheck | None:
@@ -109,7 +109,7 @@ class Record(FlexibleResults, ABC):
         """Reason why samples with finite states cannot be used, or ""."""
         run = self.trajectory
         if (
-            not self.model.flexible
+            not self.model.flexible_bodies
             and max(_max_abs(run.q), _max_abs(run.u), _max_abs(run.work)) < _MAX_SAFE_MAGNITUDE
         ):
             return ""
@@ -122,7 +122,7 @@ class Record(FlexibleResults, ABC):
         return "" if finite else "its energies or momenta are beyond what numbers hold"
 
     @property
-    def methods(self) -> tuple[MethodSegment, ...]:
+    def method_history(self) -> tuple[MethodSegment, ...]:
         """Segments of method="auto": method, start (s), reason and fastest motion (1/s).
 
         Empty for a run with a given method.
@@ -130,14 +130,14 @@ class Record(FlexibleResults, ABC):
         return self.trajectory.methods
 
     @property
-    def error_estimate(self) -> AchievedError | None:
+    def achieved_error(self) -> AchievedError | None:
         """Achieved error for the target `simulate(error=...)`; None without a target."""
-        return self.trajectory.reached
+        return self.trajectory.achieved_error
 
     @property
     def last_state(self) -> tuple[float, Array, Array]:
         """Last valid state (t, q, u): the end, or the last one before a failure."""
-        state = self.trajectory.last
+        state = self.trajectory.last_state
         return (float(self.t[-1]), self.q[-1], self.u[-1]) if state is None else state
 
     @property
@@ -164,7 +164,7 @@ class Record(FlexibleResults, ABC):
 
         Findings are left out if the run was to ignore them.
         """
-        risks = self.risks if self.trajectory.told else ()
+        risks = self.risks if self.trajectory.reported_risks else ()
         notes, failures = self.trajectory.notes, self._observed.failures
         return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
 
@@ -206,11 +206,11 @@ class Record(FlexibleResults, ABC):
 
     # --- hinges ---------------------------------------------------------------------------------
 
-    def coordinate(self, hinge: str) -> Array:
+    def coordinates(self, hinge: str) -> Array:
         """Coordinates (n, nq) of one hinge; of a flexible body the modal coordinates."""
         return self.q[:, self._quantities.slots(hinge).q_slice]
 
-    def speed(self, hinge: str) -> Array:
+    def speeds(self, hinge: str) -> Array:
         """Speeds (n, nu) of one hinge; of a flexible body the modal speeds."""
         return self.u[:, self._quantities.slots(hinge).u_slice]
 
@@ -226,7 +226,7 @@ class Record(FlexibleResults, ABC):
         """Efforts (n, nu) in N, N*m along the speeds of a hinge, of its law or its drive."""
         return self._quantities.effort(hinge)
 
-    def layout(self, hinge: str) -> HingeSlots:
+    def coordinate_info(self, hinge: str) -> HingeSlots:
         """Names, units and slots of a hinge's coordinates and speeds."""
         return self._quantities.slots(hinge)
 
@@ -241,7 +241,7 @@ class Record(FlexibleResults, ABC):
         """Total energy (n,) in J: kinetic, gravity (zero at the inertial origin), springs."""
         return self._quantities.sum("energy")
 
-    def energies(self) -> dict[str, Array]:
+    def energy_components(self) -> dict[str, Array]:
         """Parts of the energy, (n,) each in J: kinetic, gravity, springs."""
         names = ("kinetic", "gravity", "springs")
         return {name: self._quantities.sum(f"energy.{name}") for name in names}
@@ -269,7 +269,7 @@ class Record(FlexibleResults, ABC):
 
     # --- by name --------------------------------------------------------------------------------
 
-    def names(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """All names that `quantity`, `plot` and `table` accept."""
         return tuple(self._quantities.names())
 

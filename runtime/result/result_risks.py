@@ -55,7 +55,7 @@ def balance_risks(
     """Findings: energy and momentum that are unknown, or drift more than steps explain."""
     has_misfit = closure is not None and closure.misfit > 0
     for drift in drifts:
-        if not drift.known:
+        if not drift.is_known:
             yield Risk(
                 _drift_risk_name(drift), drift.name,
                 f"{drift.name} cannot be balanced: it is beyond what numbers hold, or no sample "

@@ -47,7 +47,9 @@ def find_state_risks(model: CompiledScene, t: float, q: Array, u: Array) -> tupl
     """Find the risks of the state q (nq,), u (nu,) at t (s): of its models, sweep and loops."""
     settings = Settings(t, t)
     findings = check_before_run(model, settings, q, u)
-    return result_of(model, findings.given(driven_states(model, settings, q, u, [t]), q, u)).risks
+    return result_of(
+        model, findings.attach_to(driven_states(model, settings, q, u, [t]), q, u)
+    ).risks
 
 
 def merge_over_values(
@@ -62,8 +64,10 @@ def merge_over_values(
         for risk in risks:
             groups.setdefault((risk.name, risk.element), []).append((value, risk))
     for rows in groups.values():
-        worst_value, worst = max(rows, key=lambda row: (row[1].doubt, abs(row[1].figure or 0.0)))
+        worst_value, worst = max(
+            rows, key=lambda row: (row[1].invalidates, abs(row[1].value or 0.0))
+        )
         others = len({value for value, _ in rows}) - 1
         where = f"at {parameter} = {worst_value:g}"
         where += f" and {others} other values" if others else ""
-        yield replace(worst, means=f"{where}: {worst.means}")
+        yield replace(worst, description=f"{where}: {worst.description}")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 def applies_to(model: CompiledScene) -> bool:
     """Whether omitted redundant rows have a gap above rounding."""
-    return model.closed is not None and model.closed.loops.misfit[0] > 0.0
+    return model.closed is not None and model.closed.loops.redundancy_gap[0] > 0.0
 
 
 def loop_misfit_risks(
@@ -25,10 +25,10 @@ def loop_misfit_risks(
 ) -> Iterator[Risk]:
     """Risk of the omitted row with the largest gap."""
     assert model.closed is not None
-    gap, name, direction = model.closed.loops.misfit
+    gap, name, direction = model.closed.loops.redundancy_gap
     yield Risk(
         MISFIT_RISK, f'"{name}"',
         f"direction {direction} of the loop is redundant, violated by {gap:.1e} (m, rad); it is "
         "left out, for the mechanism would lock if it were satisfied exactly",
-        MISFIT_REMEDY, gap, before=True,
+        MISFIT_REMEDY, gap, seen_before_run=True,
     )  # fmt: skip

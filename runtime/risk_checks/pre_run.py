@@ -57,12 +57,12 @@ class PreRunFindings:
     risks: Iterable[Risk]
     told: bool = True
 
-    def given(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
+    def attach_to(self, run: Trajectory, q: Array, u: Array) -> Trajectory:
         """Attach these findings, and those of its steps, to the run from q (nq,), u (nu,)."""
         risks = DeferredRisks(
             lambda: (*self.risks, *run.risks, *stiffness.stability_limited_risks(self.model, run))
         )
-        return replace(run, start=(q, u), risks=risks, told=self.told)
+        return replace(run, start=(q, u), risks=risks, reported_risks=self.told)
 
 
 def check_before_run(
@@ -74,7 +74,10 @@ def check_before_run(
     """
     if model not in _applicable_checks:
         _applicable_checks[model] = tuple(check for applies, check in _CHECKS if applies(model))
-    checks, notes = _applicable_checks[model], unmapped_expression_notes(model.packed, settings)
+    checks, notes = (
+        _applicable_checks[model],
+        unmapped_expression_notes(model.packed_scene, settings),
+    )
     risks = DeferredRisks(
         lambda: (*notes, *(risk for check in checks for risk in check(model, settings, q, u)))
     )

@@ -59,7 +59,7 @@ def apply_policy(result: Result, on_risk: str) -> Result:
 
 def _reject_objections(risks: Iterable[Risk], where: str, result: Result | None = None) -> None:
     """Raise RiskRefused if one of the risks is an objection."""
-    objections = [risk for risk in risks if risk.doubt]
+    objections = [risk for risk in risks if risk.invalidates]
     if objections:
         rows = "\n".join(f"  {risk.name}: {risk}" for risk in objections)
         raise RiskRefused(

@@ -40,7 +40,7 @@ def _compute_limits(model: CompiledScene) -> Iterator[tuple[str, float]]:
     beams = {beam.name: beam for beam in model.scene.beam}
     environment = BeamEnvironment(model.scene) if beams else None
     limits_by_beam = dict[str, float]()  # equal beams share one computation
-    for name, body in model.flexible.items():
+    for name, body in model.flexible_bodies.items():
         limit = body.resolved
         if body.shapes is not None and name in beams and environment is not None:
             beam, data = beams[name], body.shapes.data

@@ -19,7 +19,7 @@ def applies_to(model: CompiledScene) -> bool:
     """Whether loops start in a singular configuration with some initial speeds not given."""
     if model.closed is None or not model.closed.loops.singular:
         return False
-    hinges = [hinge for hinge in model.packed.described.hinge if not hinge.is_weld]
+    hinges = [hinge for hinge in model.packed_scene.described.hinge if not hinge.is_weld]
     return any(hinge.drive is None and hinge.name not in model.closed.fast for hinge in hinges)
 
 
@@ -30,11 +30,11 @@ def singular_start_risks(
     assert model.closed is not None
     if not np.array_equal(q, model.closed.start[0]):
         return
-    hinge = model.closed.loops.redundant[0][0]
+    hinge = model.closed.loops.redundant_rows[0][0]
     yield Risk(
         "branching-start", f'hinge "{hinge}"',
         "the loops start in a singular configuration, where the motion is not unique; if only some "
         "speeds are given, they may be compatible with no motion",
         "give the speeds of all hinges (initial.u) for the intended motion, or start in another "
-        "configuration", before=True,
+        "configuration", seen_before_run=True,
     )  # fmt: skip

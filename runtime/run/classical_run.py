@@ -68,10 +68,10 @@ def integrate(
         )
     parse_scheme(settings.scheme)
     reject_loops(
-        model.packed, f'method "{settings.method}"',
+        model.packed_scene, f'method "{settings.method}"',
         "its sources state it for chains and trees alone; genalpha and rodas4p2 do",
     )  # fmt: skip
-    reject_qr_steps(model.packed)
+    reject_qr_steps(model.packed_scene)
     return _Run(model, settings, report_time).run(q, u)
 
 
@@ -104,7 +104,7 @@ class _Run:
     def __init__(
         self, model: CompiledScene, settings: Settings, report_time: Callable[[float], None]
     ) -> None:
-        self.engine, self.settings, self.report_time = model.apart, settings, report_time
+        self.engine, self.settings, self.report_time = model.unmerged_engine, settings, report_time
         self.system = SceneSystem(self.engine)
         self.nq, self.nu = self.engine.nq, self.engine.nu
         self.samples, self.steps = _SampleBuffer(), 0

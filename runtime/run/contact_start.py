@@ -30,7 +30,7 @@ class ContactSystem(Protocol):
     engine: LoopedEngine
     memory: Array
 
-    def watched(self, t: float, y: Array) -> Array | None: ...
+    def event_values(self, t: float, y: Array) -> Array | None: ...
     def meeting(self, event: int, t: float, y: Array, u: Array) -> Any: ...
 
 
@@ -40,8 +40,8 @@ def check_contact_start(system: ContactSystem, t: float, y: Array) -> None:
     Raises SceneError where the state rests on a bounce event or a hard stop, is past a bounce event
     without leaving it, or is past a hard stop.
     """
-    bounces = system.engine.packed.watched.bounces
-    values = system.watched(t, y) if bounces else None
+    bounces = system.engine.packed.event_functions.bounces
+    values = system.event_values(t, y) if bounces else None
     if values is None:
         return
     for bounce in bounces:

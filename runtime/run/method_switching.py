@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
 
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.plain_data import to_plain
 
 from ..integrate.c_loop import Integrator
 from ..integrate.settings import Settings
@@ -56,7 +56,7 @@ class Choice:
 
     def look(self, run: Integrator) -> None:
         """Change the method if the run returned for that and its steps indicate it."""
-        rate = self._fastest_rate(run) if run.asked else None
+        rate = self._fastest_rate(run) if run.callback_requested else None
         if rate is None:
             return
         if run.tableau.implicit:
@@ -142,7 +142,7 @@ class Choice:
     def state(self) -> str:
         """State of the choice as JSON text, for a checkpoint."""
         return json.dumps({
-            "stretches": [asdict(s) for s in self.stretches],
+            "stretches": to_plain(self.stretches),
             "asked_for": self._request, "since": self._first_step,
         })  # fmt: skip
 

@@ -151,7 +151,7 @@ def first_run(
         settings, segments = replace(settings, method=settings.first_method), ()
     result = trajectory(system, run, settings, status, message, earlier)
     if watch.before:
-        result = replace(result, before=watch.before)
+        result = replace(result, start_findings=watch.before)
     if segments:
         result = replace(result, methods=segments)
     if status is not None and not result.is_comparable:
@@ -171,7 +171,7 @@ def _failure_message(engine: LoopedEngine, run: Trajectory, q: Array, u: Array) 
     diverged = run.status is Status.NOT_FINITE or max_speed > _DIVERGED_SPEED
     if (step is None or step.risk is None) and diverged and REMEDY not in run.message:
         step = check_later(engine, run) or step
-    return run.message if step is None else step.blamed(run.message)
+    return run.message if step is None else step.explain_failure(run.message)
 
 
 def _advance_and_save(
@@ -216,7 +216,7 @@ def second_run(
 
     Failures of the second run and equal steps are noted in `watch`.
     """
-    time_map = model.packed.time_map(first.settings.t_start, first.settings.t_end)
+    time_map = model.packed_scene.time_map(first.settings.t_start, first.settings.t_end)
     settings, reference = reference_settings(first, time_map.breaks.tolist())
     watch.run = 1
     second = first_run(model, settings, q, u, watch)
@@ -228,4 +228,4 @@ def second_run(
         return None
     if not len(np.intersect1d(first.t, second.t)) or second.status is None:
         return None
-    return compare(model.layout, first, second, reference, q)
+    return compare(model.coordinate_layout, first, second, reference, q)

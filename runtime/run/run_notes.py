@@ -30,13 +30,13 @@ def unmapped_expression_notes(packed: PackedScene, settings: Settings) -> tuple[
     risks = list(time_map.notes)
     if settings.step is not None:
         risks += [risk] if (risk := time_map.too_long(settings.step)) else []
-    count = len(packed.watched.switches)
+    count = len(packed.event_functions.switches)
     if count > MOST:
         risks.append(Risk(
             "switches", RUN,
             f"more than {MOST} conditions depend on the motion; only the first {MOST} end a step "
             "where they switch", "give max_step so that none is missed",
-            count, MOST, before=True,
+            count, MOST, seen_before_run=True,
         ))  # fmt: skip
     return tuple(risks)
 
@@ -50,7 +50,7 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
     settings, statistics = run.settings, run.statistics
     if settings.step is None:
         return ()
-    error, tableau = statistics.sum_local_error, get(settings.method, settings.radius)
+    error, tableau = statistics.sum_of_local_errors, get(settings.method, settings.radius)
     if not tableau.implicit:
         return ()
     if settings.step > settings.t_end - settings.t_start:
@@ -59,7 +59,7 @@ def step_too_long_note(run: Trajectory) -> tuple[Risk, ...]:
             "step-accuracy", RUN,
             f"step = {settings.step:.4g} s is longer than the run of {span:.4g} s, which becomes "
             "one step", f"use a step below {span:.4g} s", settings.step, span, "s",
-            before=True,
+            seen_before_run=True,
         ),)  # fmt: skip
     if error is None or len(run.t) < 3:
         return ()

@@ -59,13 +59,13 @@ class SceneSystem:
         packed, ffi = engine.packed, engine.ffi
         self.engine, self.kept = engine, list[Any]()
         actions, self.event_names = _event_actions(engine)
-        self.switches, self.on_positions = packed.watched.switches, False
+        self.switches, self.on_positions = packed.event_functions.switches, False
         self.memory = engine.start_memory()
         model, system = packed.model, packed.system
         self.run = run = ffi.new("mstmm_scene_run *")
         run.model = model
         does_work = bool(system.laws or system.driven or system.loads or system.forces)
-        does_work = does_work or bool(system.couplings) or bool(packed.watched.bounces)
+        does_work = does_work or bool(system.couplings) or bool(packed.event_functions.bounces)
         does_work = does_work or any(
             body.D.any() or body.drag is not None for body in packed.flexible.values()
         )
@@ -75,8 +75,8 @@ class SceneSystem:
         run.quaternions = ffi.from_buffer("int[]", quaternions)
         run.n_quaternions = len(packed.layout.quaternions)
         self.kept += [model, quaternions]
-        if packed.watched.tape is not None:
-            self._set_events(packed.watched.tape, packed.watched.ends, actions)
+        if packed.event_functions.tape is not None:
+            self._set_events(packed.event_functions.tape, packed.event_functions.ends, actions)
         if packed.described.controller:
             controllers = Controllers(engine)
             run.n_controllers, run.controllers = controllers.count, controllers.records
@@ -93,7 +93,7 @@ class SceneSystem:
         self.system = ffi.new("mstmm_system *")
         engine.lib.mstmm_scene_system(run, self.system)
 
-    def goes_by(self, compiled: SceneCode | None) -> bool:
+    def uses_code(self, compiled: SceneCode | None) -> bool:
         """True if the right-hand side is this fused code, or the looped engine for None."""
         code = self._code
         if code is None or compiled is None:
@@ -113,7 +113,7 @@ class SceneSystem:
         base_state, coordinates = np.zeros(size), np.zeros(engine.nu + 1, dtype=np.int32)
         stage.workspace, stage.work = run.workspace, engine.pointer(work)
         run.base, run.stage, run.known = base.record, stage, engine.pointer(base_state)
-        run.steady = int(engine.packed.system.steady)
+        run.steady = int(engine.packed.system.is_autonomous)
         run.coordinates = engine.ffi.from_buffer("int[]", coordinates)
         engine.lib.mstmm_scene_implicit(run, self.system)
         self.kept += [base, stage, work, base_state, coordinates]
@@ -174,7 +174,7 @@ class SceneSystem:
         table = ffi.new("mstmm_event_action[]", max(1, len(actions)))
         for record, (action, release) in zip(table, actions, strict=False):
             record.action, record.release = action, release
-        for bounce in engine.packed.watched.bounces:
+        for bounce in engine.packed.event_functions.bounces:
             self._set_bounce(table[bounce.event], bounce)
         run.events, run.n_events = table, len(actions)
         run.closes = int(engine.packed.system.closes and _reads_state(engine.packed.scene))
@@ -212,7 +212,7 @@ class SceneSystem:
         check_contact_start(self, t, y)
         return y
 
-    def watched(self, t: float, y: Array) -> Array | None:
+    def event_values(self, t: float, y: Array) -> Array | None:
         """Values of events (>= 0 where they hold), followed by the margins of switches.
 
         None where they cannot be evaluated.

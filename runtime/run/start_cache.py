@@ -60,7 +60,7 @@ class StartCache:
     @staticmethod
     def _is_reusable(system: SceneSystem, compiled: SceneCode | None, settings: Settings) -> bool:
         same_level = system.on_positions == uses_position_constraints(settings)
-        return system.goes_by(compiled) and same_level
+        return system.uses_code(compiled) and same_level
 
     def _energy_at(self, system: SceneSystem, t: float, start: Array) -> float:
         """Energy of the start in J, computed once for runs from the same start."""

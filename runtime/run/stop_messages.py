@@ -76,7 +76,7 @@ def stop_message(system: SceneSystem, run: Integrator) -> str:
 
 def rest_note(system: SceneSystem, event: int) -> str:
     """Ending of the message of a run that accumulating bounces of an event stopped, else ""."""
-    if all(bounce.event != event for bounce in system.engine.packed.watched.bounces):
+    if all(bounce.event != event for bounce in system.engine.packed.event_functions.bounces):
         return ""
     return (
         ": its bounces accumulate and have come to rest on the contact; to continue the run at "
@@ -198,5 +198,5 @@ def _switch_note(system: SceneSystem, run: Integrator) -> str:
 
 def _switch_margins(system: SceneSystem, t: float, y: Array) -> Array:
     """Margins (n_switches,) of the switches, zero where they switch; ones if not evaluable."""
-    values = system.watched(t, y)
+    values = system.event_values(t, y)
     return np.ones(system.system.n_switches) if values is None else values[system.system.n_events :]

@@ -17,7 +17,7 @@ EVALUATION = 1e-6
 
 @pytest.fixture(autouse=True)
 def _counted_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    called = Runs.called
+    called = Runs.simulate_with
 
     def counted(
         self: Runs, model: Model, options: Mapping[str, Any], limit: float, own_steps: bool = False

@@ -22,7 +22,7 @@ from mstmm.runtime.chart.time_budget import Budget
 def test_nothing_to_reduce_is_an_answer() -> None:
     made = mstmm.advise(pendulum(), 1.0, error=1e-4, of="bob.tip.position", rounds=0, budget=600)
     assert made.bodies == ()
-    assert not made.reduced
+    assert not made.is_reduced
     assert any("nothing to reduce" in note for note in made.notes)
     assert made.error <= 1e-4
     assert made.scene == pendulum()
@@ -36,10 +36,10 @@ def test_bodies_that_respond_no_way_but_coupled() -> None:
     (body,) = made.bodies
     assert body.evidence is not None
     assert body.evidence.deflection == pytest.approx(1.07e-2, rel=0.01)
-    assert body.choice.coupled
+    assert body.model.coupled
     assert made.error <= 1e-2
-    refused = [one for one in made.tried if one.error is None]
-    assert refused == [] or all("drag" in one.why for one in refused)
+    refused = [one for one in made.tried_models if one.error is None]
+    assert refused == [] or all("drag" in one.reason for one in refused)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_a_scene_that_fails_says_why() -> None:
 
 def test_the_scene_that_is_written(tmp_path: Path) -> None:
     made = mstmm.advise(hub_and_beam("B", 2), period("B"), error=1e-3, of=TIP, rounds=0, budget=600)
-    path = made.write(tmp_path / "small.toml")
+    path = made.save_scene(tmp_path / "small.toml")
     text = path.read_text()
     assert text.startswith("# Reduced for an error of 0.001 m of arm.tip.position")
     assert f"--method {made.method}" in text
@@ -97,14 +97,14 @@ def test_an_error_of_a_quantity_has_its_unit() -> None:
     made = mstmm.advise(
         hub_and_beam("B", 1), period("B"), error=20.0, of="root.force", rounds=0, budget=600
     )
-    assert (made.unit, made.asked) == ("N", 20.0)
+    assert (made.unit, made.target_error) == ("N", 20.0)
     assert made.error <= 20.0
 
 
 def test_what_is_written_is_toml(tmp_path: Path) -> None:
     made = mstmm.advise(pendulum(), 0.2, rounds=0, budget=600)
     with pytest.raises(mstmm.SceneError, match=r"ends in \.toml"):
-        made.write(tmp_path / "small.json")
+        made.save_scene(tmp_path / "small.json")
 
 
 def test_as_plain_values() -> None:
@@ -125,16 +125,16 @@ def test_a_window_where_the_whole_run_takes_too_long() -> None:
         model, asked, lambda scene: mstmm.compile(scene, engine="looped"), lambda _: None,
         said.append, Budget(100.0, Clock(0.4)),
     )  # fmt: skip
-    assert not made.whole
-    assert "the first" in made.compared
+    assert not made.covers_whole_run
+    assert "the first" in made.comparison_text
     assert any("errors times" in text for text in said)
 
 
 def test_errors_of_a_window_grow_with_time() -> None:
     span = ComparisonWindow(0.5, 2.0)
-    assert not span.whole
+    assert not span.is_whole_run
     assert span.growth == 4.0
-    assert ComparisonWindow(2.0, 2.0).whole
+    assert ComparisonWindow(2.0, 2.0).is_whole_run
     assert np.isclose(ComparisonWindow(2.0, 2.0).growth, 1.0)
 
 

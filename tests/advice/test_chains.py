@@ -106,7 +106,7 @@ def advised(scene: mstmm.Scene, error: float) -> mstmm.Advice:
     made = mstmm.advise(scene, 0.5, error=error, of=OF, rounds=0, budget=600)
     truth = tip(scene, 0.5, OF, method="rodas5p", rtol=1e-9, atol=1e-11)
     read = mstmm.Scene.from_data(tomllib.loads(made.scene.to_toml()))
-    ours = tip(read, 0.5, made.renamed(OF), **made.options)
+    ours = tip(read, 0.5, made.reduced_name(OF), **made.options)
     assert np.linalg.norm(ours - truth, axis=1).max() <= error
     return made
 
@@ -115,16 +115,16 @@ def test_stiff_members_become_rigid_and_one() -> None:
     """Stiff pins but for the first of every two: three rods of two."""
     made = advised(rope(6, {}, {"law": {"stiffness": 1e6, "damping": 1e2}}), 1e-2)
     assert [body.name for body in made.scene.body] == ["rope_0", "rope_2", "rope_4"]
-    assert made.renamed("rope[last].tip") == "rope_4.rope_5_tip"
-    assert 'hinge "rope[3].hinge": rigid' in " ".join(made.changes)
-    assert 'chain "rope": expanded into bodies rope_0 to rope_5' in " ".join(made.changes)
+    assert made.reduced_name("rope[last].tip") == "rope_4.rope_5_tip"
+    assert 'hinge "rope[3].hinge": rigid' in " ".join(made.other_changes)
+    assert 'chain "rope": expanded into bodies rope_0 to rope_5' in " ".join(made.other_changes)
 
 
 def test_dampers_of_a_chain_that_hardly_matter_go_together() -> None:
     made = advised(rope(3, {"law": {"damping": 1e-9}}), 1e-3)
     (chain,) = made.scene.chain
     assert chain.hinge[0].law.damping == (0.0,)
-    assert 'chain "rope": without its damper' in " ".join(made.changes)
+    assert 'chain "rope": without its damper' in " ".join(made.other_changes)
 
 
 def test_dampers_of_some_members() -> None:

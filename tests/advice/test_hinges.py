@@ -19,7 +19,9 @@ OF = "d.tip.position"
 def error(made: mstmm.Advice, scene: mstmm.Scene) -> float:
     truth = tip(scene, 1.0, OF, method="rodas5p", rtol=1e-9, atol=1e-11)
     return float(
-        np.linalg.norm(tip(made.scene, 1.0, made.renamed(OF), **made.options) - truth, axis=1).max()
+        np.linalg.norm(
+            tip(made.scene, 1.0, made.reduced_name(OF), **made.options) - truth, axis=1
+        ).max()
     )
 
 
@@ -27,16 +29,16 @@ def test_stiff_hinges_become_rigid() -> None:
     """Where they stand, not where they were drawn: the sprung pin rests at 0.4 rad."""
     scene = sprung(3e5)
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=1, budget=600)
-    told = " ".join(made.changes)
+    told = " ".join(made.other_changes)
     assert all(f'hinge "{name}": rigid' in told for name in ("spring", "bushing", "slide"))
     assert 'hinge "pivot": without its damper' in told
     for name in ("spring", "bushing", "slide"):
-        (one,) = (text for text in made.changes if text.startswith(f'hinge "{name}": rigid'))
+        (one,) = (text for text in made.other_changes if text.startswith(f'hinge "{name}": rigid'))
         found = re.search(r"this change alone: error (\S+), (\S+) of the time before", one)
         assert found and float(found[1]) <= 1e-2 and float(found[2]) > 0
-    assert any("with these 3 changes: error" in text for text in made.changes)
+    assert any("with these 3 changes: error" in text for text in made.other_changes)
     assert mstmm.compile(made.scene, engine="looped").nu == 1
-    assert made.reduced
+    assert made.is_reduced
     assert made.model_saving is not None
     assert error(made, scene) <= 1e-2
 
@@ -48,7 +50,7 @@ def test_a_model_that_takes_longer_and_errs_more_is_not_advised(
     scene = sprung(3e5)
     monkeypatch.setattr(advice_summary, "compare_cpu_times", lambda *_: (0.89, 1.0))
     made = mstmm.advise(scene, 1.0, error=1e-2, of=OF, rounds=0, budget=600)
-    assert not made.reduced and made.changes == () and made.model_saving == 1.0
+    assert not made.is_reduced and made.other_changes == () and made.model_saving == 1.0
     assert mstmm.compile(made.scene, engine="looped").nu == mstmm.compile(scene).nu
     assert any("1.12 times the time of the scene as given" in note for note in made.notes)
     assert made.error <= 1e-2 and error(made, scene) <= 1e-2
@@ -58,7 +60,7 @@ def test_soft_ones_stay() -> None:
     """50 N m/rad under rods of 1 kg: it swings by more than a rad; a damper of 5 N m s brakes."""
     scene = sprung(50.0, damping=5.0)
     made = mstmm.advise(scene, 1.0, error=1e-3, of=OF, rounds=0, budget=600)
-    told = " ".join(made.changes)
+    told = " ".join(made.other_changes)
     assert "pivot" not in told
     assert '"spring"' not in told
     assert 'hinge "slide": rigid' in told
@@ -76,7 +78,7 @@ def test_springs_between_bodies_that_do_nothing() -> None:
     scene = mstmm.Scene(**{**sprung(1e5).model_dump(by_alias=True), "spring": springs})
     made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0, budget=600)
     assert [one.name for one in made.scene.spring] == ["taut"]
-    assert any('spring "slack": left out' in text for text in made.changes)
+    assert any('spring "slack": left out' in text for text in made.other_changes)
 
 
 @pytest.mark.parametrize("by_event", [True, False])
@@ -90,7 +92,7 @@ def test_what_is_released_stays(by_event: bool) -> None:
         slide |= {"release": "t >= 0.3"}
     scene = mstmm.Scene(**data | {"hinge": [*others, slide]})
     made = mstmm.advise(scene, 0.5, error=1e-2, of=OF, rounds=0, budget=600)
-    assert '"slide"' not in " ".join(made.changes)
+    assert '"slide"' not in " ".join(made.other_changes)
     assert made.scene.hinge[-1].type == "prismatic"
 
 

@@ -27,7 +27,7 @@ def apart(made: mstmm.Advice, data: Data, end: str, length: float, t_end: float 
     places, times = [], np.linspace(0.0, t_end, 21)
     for scene, name, options in (
         (mstmm.Scene(**data), end, {"rtol": 1e-10, "atol": 1e-12}),
-        (made.scene, made.renamed(end), made.options),
+        (made.scene, made.reduced_name(end), made.options),
     ):
         model = mstmm.compile(scene, engine="looped")
         places.append(model.simulate(t_end, output_times=times, **options).position(name))
@@ -48,13 +48,13 @@ def with_plate(**ends: Any) -> Data:
 def test_a_rod_that_bends(error: float, level: str) -> None:
     data, t_end = slider_crank(), 0.05
     made = advised(data, error, t_end)
-    assert made.bodies[0].choice.level == level
+    assert made.bodies[0].model.level == level
     assert apart(made, data, "bar.tip", 0.9, t_end) < error
 
 
 def test_a_ball_in_a_plane_is_a_pin() -> None:
     made = advised(four_bar(speed=2.0, tip=BALL))
-    assert any("pin instead of ball" in one for one in made.changes)
+    assert any("pin instead of ball" in one for one in made.other_changes)
 
 
 def test_a_stiff_hinge_of_a_loop_becomes_rigid() -> None:
@@ -67,7 +67,7 @@ def test_a_stiff_hinge_of_a_loop_becomes_rigid() -> None:
          "law": {"stiffness": 1e7, "damping": 1e3}},
     )  # fmt: skip
     made = advised(data)
-    assert any('"mid": rigid' in one for one in made.changes)
+    assert any('"mid": rigid' in one for one in made.other_changes)
     assert apart(made, data, "other.tip", 1.2) < 1e-3
 
 

@@ -186,7 +186,7 @@ def test_what_is_welded_to_the_ground_in_an_advice() -> None:
     (pivot,) = made.scene.hinge
     assert pivot.inboard == "ground"
     assert pivot.position == pytest.approx([np.cos(0.3), 2 + np.sin(0.3), 0])
-    assert any("pillar.top is at [0, 2, 0] now" in text for text in made.changes)
+    assert any("pillar.top is at [0, 2, 0] now" in text for text in made.other_changes)
     assert made.error <= 1e-3
     asked = mstmm.advise(scene, 0.5, error=1e-3, of="pillar.top.position", rounds=0, budget=600)
     assert "pillar" in {body.name for body in asked.scene.body}
@@ -201,6 +201,6 @@ def test_in_an_advice() -> None:
     made = mstmm.advise(hub_and_beam("A"), period("A"), error=5e-3, of=TIP, rounds=0, budget=600)
     assert [body.name for body in made.scene.body] == ["hub"]
     assert made.scene.beam == ()
-    assert made.renamed(TIP) == "hub.arm_tip.position"
-    assert any("arm.tip is hub.arm_tip now" in text for text in made.changes)
+    assert made.reduced_name(TIP) == "hub.arm_tip.position"
+    assert any("arm.tip is hub.arm_tip now" in text for text in made.other_changes)
     assert "arm.tip is hub.arm_tip now" in made.to_toml()

@@ -21,9 +21,9 @@ def advised(name: str, error: float) -> mstmm.Advice:
 @pytest.mark.parametrize("name", HUBS)
 def test_keeps_what_was_asked(name: str, error: float) -> None:
     made = advised(name, error)
-    scene = hub_and_pieces(name, 10) if made.parts else hub_and_beam(name)
+    scene = hub_and_pieces(name, 10) if made.beam_parts else hub_and_beam(name)
     truth = tip(scene, period(name), method="rodas5p", rtol=1e-6, atol=1e-8)
-    found = tip(made.scene, period(name), made.renamed(TIP), **made.options)
+    found = tip(made.scene, period(name), made.reduced_name(TIP), **made.options)
     assert np.linalg.norm(found - truth, axis=1).max() <= error
     assert made.error <= error
 
@@ -33,18 +33,18 @@ def test_levels() -> None:
     loads change the stiffness."""
     (a,), (b,), (c,) = (advised(name, 1e-3).bodies for name in "ABC")
     (d,) = advised("D", 1e-2).bodies
-    assert a.choice.level == "rigid"
+    assert a.model.level == "rigid"
     for body in (b, c):
-        assert body.choice.coupled
-        assert body.choice.shapes == (("y", 1),)
-    assert d.choice.level == "stiffened"
-    assert d.choice.total in (1, 2)  # which of them is cheaper, the machine decides
+        assert body.model.coupled
+        assert body.model.shapes == (("y", 1),)
+    assert d.model.level == "stiffened"
+    assert d.model.total in (1, 2)  # which of them is cheaper, the machine decides
 
 
 def test_a_light_hub_at_a_looser_error_is_rigid() -> None:
     """A light hub makes a one-way response worse than none (chi 0.6): rigid errs by 4.7e-3."""
     (body,) = advised("C", 1e-2).bodies
-    assert body.choice.level == "rigid"
+    assert body.model.level == "rigid"
     assert body.error == pytest.approx(4.7e-3, rel=0.05)
 
 
@@ -66,14 +66,14 @@ def test_estimates() -> None:
 def test_splits_a_beam_that_one_frame_cannot_follow() -> None:
     """A slope of 0.3: one frame errs by 2.1e-3, as against a chain of segments."""
     strict, loose = (advised("D", error) for error in (1e-3, 1e-2))
-    assert set(strict.parts) == {body.name for body in strict.bodies}
-    assert set(strict.parts.values()) == {"arm"}
-    assert len(strict.parts) > 2
-    assert strict.renamed(TIP) == f"{max(strict.parts)}.tip.position"
-    tried = {one.name: one.error for one in strict.tried}
+    assert set(strict.beam_parts) == {body.name for body in strict.bodies}
+    assert set(strict.beam_parts.values()) == {"arm"}
+    assert len(strict.beam_parts) > 2
+    assert strict.reduced_name(TIP) == f"{max(strict.beam_parts)}.tip.position"
+    tried = {one.name: one.error for one in strict.tried_models}
     assert tried["as given"] == pytest.approx(2.1e-3, rel=0.1)
-    assert any("with one frame its error is 2.1e-03" in text for text in strict.changes)
-    assert loose.parts == {}
+    assert any("with one frame its error is 2.1e-03" in text for text in strict.other_changes)
+    assert loose.beam_parts == {}
 
 
 #: A beam with modal damping of 0.1 %, and what damps its first shape alike: the frequency of a
@@ -90,12 +90,12 @@ def test_beams_are_split_whatever_damps_them(given: dict[str, Any], parts: dict[
     made = mstmm.advise(
         hub_and_beam("D", 2, **given), period("D"), error=2e-3, of=TIP, rounds=0, budget=600
     )
-    assert len(made.parts) > 1
-    words = " ".join(made.changes)
+    assert len(made.beam_parts) > 1
+    words = " ".join(made.other_changes)
     assert ("stiffness-proportional damping (0.000402 s)" in words) == (given is MODAL)
     scene = hub_and_pieces("D", 10, **parts)
     truth = tip(scene, period("D"), method="rodas5p", rtol=1e-6, atol=1e-8)
-    found = tip(made.scene, period("D"), made.renamed(TIP), **made.options)
+    found = tip(made.scene, period("D"), made.reduced_name(TIP), **made.options)
     assert np.linalg.norm(found - truth, axis=1).max() <= 2e-3
 
 
@@ -116,9 +116,9 @@ def test_a_beam_that_cannot_be_split_is_told(given: dict[str, Any], words: str) 
     whole = hub_and_beam("D", 2).model_dump(by_alias=True, exclude_none=True)
     scene = mstmm.Scene(**whole | {"beam": [whole["beam"][0] | given]})
     made = mstmm.advise(scene, period("D"), error=1e-3, of=TIP, rounds=0, budget=600)
-    assert made.parts == {}
+    assert made.beam_parts == {}
     (body,) = made.bodies
-    assert body.split is not None and body.split > 1e-3
+    assert body.frame_error is not None and body.frame_error > 1e-3
     assert words in " ".join([body.reason, *made.notes])
 
 
@@ -127,15 +127,15 @@ def test_each_body_by_itself_and_in_its_plane() -> None:
     made = mstmm.advise(scene, 1.0, error=1e-3, of="lash.tip.position", rounds=1, budget=600)
     boom, lash = made.bodies
     assert boom.name == "boom"
-    assert boom.choice.level == "rigid"
-    assert dict(boom.given.shapes) == {"y": 2, "z": 1}
+    assert boom.model.level == "rigid"
+    assert dict(boom.given_model.shapes) == {"y": 2, "z": 1}
     assert boom.error is not None and boom.error < 1e-4
-    assert lash.choice.coupled
+    assert lash.model.coupled
     assert made.scene.hinge[1].type == "pin"
-    assert any("elbow" in text for text in made.changes)
+    assert any("elbow" in text for text in made.other_changes)
     assert made.model_saving is not None and made.model_saving > 2
     truth = tip(scene, 1.0, "lash.tip.position", method="rodas5p", rtol=1e-8, atol=1e-10)
-    found = tip(made.scene, 1.0, made.renamed("lash.tip.position"), **made.options)
+    found = tip(made.scene, 1.0, made.reduced_name("lash.tip.position"), **made.options)
     assert np.linalg.norm(found - truth, axis=1).max() <= 1e-3
 
 
@@ -144,9 +144,9 @@ def test_a_given_model_that_is_too_little() -> None:
     scene = hub_and_beam("D", 2, stiffening=False)
     made = mstmm.advise(scene, period("D"), error=1e-2, of=TIP, rounds=0, budget=600)
     (body,) = made.bodies
-    assert body.given.level == "linear"
-    assert body.choice.level == "stiffened"
-    tried = {one.name: one.error for one in made.tried}
+    assert body.given_model.level == "linear"
+    assert body.model.level == "stiffened"
+    tried = {one.name: one.error for one in made.tried_models}
     assert tried["as given"] == pytest.approx(4.2e-2, rel=0.05)
 
 
@@ -156,9 +156,9 @@ def test_a_beam_that_cannot_bend_in_the_plane_of_the_motion() -> None:
     across = mstmm.Scene(**scene | {"beam": [beam | {"modes": {"z": 2}, "basis": "auto"}]})
     made = mstmm.advise(across, period("B"), error=1e-3, of=TIP, rounds=0, budget=600)
     (body,) = made.bodies
-    assert dict(body.given.shapes) == {"z": 2}
-    assert body.choice.level == "rigid"
-    assert made.reduced
+    assert dict(body.given_model.shapes) == {"z": 2}
+    assert body.model.level == "rigid"
+    assert made.is_reduced
 
 
 def test_a_body_of_finite_elements_keeps_its_static_shapes() -> None:
@@ -179,9 +179,9 @@ def test_a_body_of_finite_elements_keeps_its_static_shapes() -> None:
     )  # fmt: skip
     made = mstmm.advise(scene, 0.3, error=1e-3, of="rod.tip.position", rounds=0, budget=600)
     (body,) = made.bodies
-    assert dict(body.given.shapes) == {"vibration": 2}
-    assert body.choice.coupled
-    assert dict(body.choice.shapes) == {"vibration": 0}
-    assert "static only" in str(body.choice)
+    assert dict(body.given_model.shapes) == {"vibration": 2}
+    assert body.model.coupled
+    assert dict(body.model.shapes) == {"vibration": 0}
+    assert "static only" in str(body.model)
     assert made.scene.elastic[0].modes == 0
     assert made.error <= 1e-3

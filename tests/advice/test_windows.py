@@ -32,8 +32,8 @@ def advised(**scene: Any) -> mstmm.Advice:
     ours = mstmm.compile(made.scene, engine="looped").simulate(
         T_END, output_times=times, **made.options
     )
-    apart = np.abs(exact.position("bar.tip") - ours.position(made.renamed("bar.tip")))
-    assert not made.whole
+    apart = np.abs(exact.position("bar.tip") - ours.position(made.reduced_name("bar.tip")))
+    assert not made.covers_whole_run
     assert apart.max() <= ERROR  # of places in parts of a length of 1 m
     return made
 
@@ -42,9 +42,9 @@ def test_the_integration_is_judged_over_the_whole_run() -> None:
     """A stiff bar that swings ten times as long as models are compared."""
     pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bar"}
     made = advised(hinge=[pin | {"initial": {"q": [0.5]}}])
-    assert made.bodies[0].choice.level == "rigid"
+    assert made.bodies[0].model.level == "rigid"
     assert made.error <= ERROR
-    assert f"the integration over all of its {T_END:g} s" in made.compared
+    assert f"the integration over all of its {T_END:g} s" in made.comparison_text
 
 
 def test_what_moves_later_stays() -> None:
@@ -62,5 +62,5 @@ def test_what_moves_later_stays() -> None:
         ],
         load=[{"on": "link.tip", "force": [0, 0, "where(t > 2, 5*sin(3*(t - 2)), 0)"]}],
     )  # fmt: skip
-    assert not made.changes
+    assert not made.other_changes
     assert any("after the window" in note for note in made.notes)

@@ -149,7 +149,7 @@ def test_the_method_fails_where_it_is_known_to(name: str) -> None:
     tried = dict(case.points)
     assert low <= min(case.holds_at, case.fails_at) <= max(case.holds_at, case.fails_at) <= high
     assert tried[case.holds_at] <= case.limit < tried[case.fails_at]
-    end = definition.high if case.fails == "above" else definition.low
+    end = definition.high if case.failing_side == "above" else definition.low
     assert tried[end] > case.limit
 
 
@@ -159,7 +159,7 @@ def test_the_remedy_holds_there_and_beyond(name: str) -> None:
     tried = dict(case.remedy_points)
     assert tried[case.fails_at] <= case.limit
     assert tried[case.remedy_holds_to] <= case.limit
-    if case.fails == "above":
+    if case.failing_side == "above":
         assert case.remedy_holds_to >= reach > case.fails_at
     else:
         assert case.remedy_holds_to <= reach < case.fails_at
@@ -169,7 +169,7 @@ def test_the_remedy_holds_there_and_beyond(name: str) -> None:
 def test_a_case_says_what_a_reader_needs(name: str) -> None:
     (case,) = cases.select_cases([name])
     assert case.name == name
-    for text in (case.title, case.why, case.parameter, case.measured, case.source):
+    for text in (case.title, case.explanation, case.parameter, case.measured, case.source):
         assert len(text) > 5
     assert len(case.title) < 75
     assert case.method.name != case.remedy.name

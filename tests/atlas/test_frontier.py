@@ -116,14 +116,14 @@ def made_up(**changes: object) -> CaseDefinition:
 
 def test_a_case_holds_what_was_tried() -> None:
     case = measure_case(made_up(), points=5, tolerance=0.01)
-    assert case.fails == "above"
+    assert case.failing_side == "above"
     assert case.holds_at <= 10.0 < case.fails_at < 10.2
     assert case.remedy_holds_to <= 500.0 < (case.remedy_fails_at or 0.0) < 510.0
     assert all(measured == at for at, measured in case.points)
     below = measure_case(
         made_up(method=MethodDefinition("one", lambda x: 100 / x), reach=1e-3), 5, 0.01
     )
-    assert below.fails == "below"
+    assert below.failing_side == "below"
     assert below.fails_at < 10.0 <= below.holds_at
     assert (below.remedy_holds_to, below.remedy_fails_at) == (1e-3, None)
 

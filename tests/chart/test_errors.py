@@ -83,7 +83,7 @@ def test_several_quantities_count_in_parts_of_their_excursions() -> None:
         if point.method != "rk4" or point.error is None or point.error < 1e-9:
             continue
         result = model().simulate(T_END, output_times=TIMES, **point.setting.options)
-        angle, energy = result.q[:, 0] + np.pi / 2, result.energies()["kinetic"]
+        angle, energy = result.q[:, 0] + np.pi / 2, result.energy_components()["kinetic"]
         true = swing(TIMES)
         kinetic = GRAVITY * LENGTH * (np.cos(true) - np.cos(AMPLITUDE))
         worst = max(

@@ -36,7 +36,7 @@ def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> Non
     for _ in range(50):
         points = drawn(rng)
         ran = [p for p in points if p.error is not None]
-        numbers = [(p.sure_error or 0.0, p.cpu_s or 0.0) for p in ran]
+        numbers = [(p.error_bound or 0.0, p.cpu_s or 0.0) for p in ran]
         best = {
             pair
             for pair in numbers
@@ -44,7 +44,7 @@ def test_the_front_is_what_no_other_point_beats(rng: np.random.Generator) -> Non
                 other != pair and other[0] <= pair[0] and other[1] <= pair[1] for other in numbers
             )
         }
-        found = [(p.sure_error or 0.0, p.cpu_s or 0.0) for p in pareto_front(points)]
+        found = [(p.error_bound or 0.0, p.cpu_s or 0.0) for p in pareto_front(points)]
         assert set(found) == best
         assert len(found) == len(best)
         assert found == sorted(found, key=lambda pair: pair[1])
@@ -58,8 +58,8 @@ def test_sure_errors_are_the_largest_of_tighter_settings(rng: np.random.Generato
             if p.method == point.method and p.setting.value <= point.setting.value
             and p.error is not None
         ]  # fmt: skip
-        assert point.sure_error == (None if point.error is None else max(tighter))
-        assert point.limited == (point.error is not None and point.error <= 3e-11)
+        assert point.error_bound == (None if point.error is None else max(tighter))
+        assert point.reference_limited == (point.error is not None and point.error <= 3e-11)
 
 
 def test_no_setting_is_surely_better_than_its_level_of_model() -> None:
@@ -67,7 +67,7 @@ def test_no_setting_is_surely_better_than_its_level_of_model() -> None:
     better = Point(Setting("genalpha", "two shapes", 1e-3), 4e-3, 2e-3, 1)
     reference = replace(REFERENCE, model="two shapes")
     found = bound_errors([near, better], reference, {"one shape": 5e-3})
-    assert [point.sure_error for point in found] == [5e-3, 4e-3]
+    assert [point.error_bound for point in found] == [5e-3, 4e-3]
     assert recommend(found, 4.5e-3, reference).model == "two shapes"
 
 
@@ -76,14 +76,14 @@ def test_what_is_recommended_is_on_the_front_and_meets_the_error(rng: np.random.
     for _ in range(30):
         points = drawn(rng)
         for asked in (1e-2, 1e-5, 1e-8):
-            enough = [p for p in points if p.sure_error is not None and p.sure_error <= asked]
+            enough = [p for p in points if p.error_bound is not None and p.error_bound <= asked]
             if not enough:
                 with pytest.raises(NumericalFailure, match="no setting reaches an error of"):
                     recommend(points, asked, REFERENCE)
                 continue
             best = recommend(points, asked, REFERENCE)
-            assert best in pareto_front(points, REFERENCE.floor)
-            assert best.sure_error is not None and best.sure_error <= asked
+            assert best in pareto_front(points, REFERENCE.smallest_resolved_error)
+            assert best.error_bound is not None and best.error_bound <= asked
             assert best.cpu_s == min(p.cpu_s or 0.0 for p in enough)
             met += 1
     assert met > 30
@@ -97,8 +97,8 @@ def test_errors_that_the_reference_cannot_judge() -> None:
         ],
         REFERENCE,
     )
-    assert all(point.limited for point in points)
-    assert [p.method for p in pareto_front(points, REFERENCE.floor)] == [
+    assert all(point.reference_limited for point in points)
+    assert [p.method for p in pareto_front(points, REFERENCE.smallest_resolved_error)] == [
         "a"
     ]  # b is no better, and slower
     assert recommend(points, 3.1e-11, REFERENCE).method == "a"
@@ -128,7 +128,7 @@ def test_json_says_why_nothing_is_recommended() -> None:
     assert "the smallest error reached is 1.0e-02" in data["not_recommended"]
     assert [(one["asked"], one["error"]) for one in data["advice"]] == [(0.1, 0.01), (0.01, 0.01)]
     assert data["front"][0]["method"] == "a"
-    met = json.loads(replace(chart, wanted=0.5).to_json())
+    met = json.loads(replace(chart, target_error=0.5).to_json())
     assert met["recommended"]["setting"] == {"rtol": 1e-3, "atol": 1e-5}
     assert met["not_recommended"] is None
 

@@ -32,12 +32,12 @@ def test_errors_are_those_of_the_closed_form() -> None:
         if point.error is None or point.error < 1e-8:
             continue
         result = model.simulate(T_END, output_times=times, **point.setting.options)
-        true = np.abs(result.coordinate("foot0")[:, 0] - exact).max()
+        true = np.abs(result.coordinates("foot0")[:, 0] - exact).max()
         assert point.error == pytest.approx(true, abs=1e-9)
         compared.add(point.method)
     assert compared == set(METHODS)
-    assert [level.degrees_of_freedom for level in made.levels] == [1]
-    refused = {one.method: one.reason for one in made.left_out if one.refused}
+    assert [level.degrees_of_freedom for level in made.model_levels] == [1]
+    refused = {one.method: one.reason for one in made.skipped if one.is_unsupported}
     assert set(refused) == set(LEFT_OUT)
     assert all("does not support closed loops" in reason for reason in refused.values())
 
@@ -48,7 +48,7 @@ def test_levels_of_a_rod_that_bends() -> None:
         mstmm.Scene(**slider_crank()), 0.1, methods=("dop853",), models=True, samples=11,
         rounds=0, budget=300,
     )  # fmt: skip
-    found = {level.name: level for level in made.levels}
+    found = {level.name: level for level in made.model_levels}
     sizes = [found[name].degrees_of_freedom for name in ("rigid", "stiffened, 2 shapes")]
     assert sizes == [1, 3]
     errors = [found[name].error for name in ("rigid", "linear, 2 shapes", "stiffened, 2 shapes")]

@@ -32,13 +32,13 @@ def tip(scene: mstmm.Scene, flexibility: str | None = None) -> np.ndarray:
 
 
 def test_the_ladder() -> None:
-    names = [level.name for level in charted().levels]
+    names = [level.name for level in charted().model_levels]
     assert names == [
         "rigid", "one-way, 1 shape", "one-way, 2 shapes", "linear, 1 shape", "linear, 2 shapes",
         "stiffened, 1 shape", "stiffened, 2 shapes",
     ]  # fmt: skip
     assert charted().reference.model == names[-1]
-    assert [level.degrees_of_freedom for level in charted().levels] == [1, 1, 1, 2, 3, 2, 3]
+    assert [level.degrees_of_freedom for level in charted().model_levels] == [1, 1, 1, 2, 3, 2, 3]
     assert {(p.model, p.method) for p in charted().points} == {
         (name, method) for name in names for method in METHODS
     }
@@ -58,7 +58,7 @@ def test_a_level_errs_by_what_its_scene_errs(
 ) -> None:
     """Scenes that are written for a level give the error that the chart finds for it."""
     apart = np.linalg.norm(tip(scene, flexibility) - tip(hub()), axis=1).max()
-    level = next(level for level in charted().levels if level.name == name)
+    level = next(level for level in charted().model_levels if level.name == name)
     assert level.error == pytest.approx(apart, rel=1e-2, abs=1e-7)
     errors = [p.error for p in charted().points if p.model == name and p.error is not None]
     assert min(errors) == pytest.approx(apart, rel=0.15, abs=1e-7)
@@ -66,10 +66,10 @@ def test_a_level_errs_by_what_its_scene_errs(
 
 def test_smaller_models_are_recommended_for_larger_errors() -> None:
     """For an error beyond that of the rigid level, and for one that shapes alone can meet."""
-    errors = {level.name: level.error for level in charted().levels}
+    errors = {level.name: level.error for level in charted().model_levels}
     rigid, linear = errors["rigid"], errors["linear, 2 shapes"]
     assert rigid is not None and linear is not None and rigid > 10 * linear
-    cheap, fine = charted().recommended(1.3 * rigid), charted().recommended(1e-8)
+    cheap, fine = charted().recommend(1.3 * rigid), charted().recommend(1e-8)
     assert fine.model == "stiffened, 2 shapes"
     assert cheap.cpu_s is not None and fine.cpu_s is not None and cheap.cpu_s <= fine.cpu_s
 
@@ -80,8 +80,8 @@ def test_what_stays_straight_is_left_out() -> None:
     made = mstmm.chart(
         scene, T_END, methods=["dop853"], models=True, samples=SAMPLES, rounds=0, budget=300
     )
-    flat = next(level for level in made.levels if level.name.startswith("planar"))
-    assert flat.degrees_of_freedom == made.levels[-1].degrees_of_freedom - 1
+    flat = next(level for level in made.model_levels if level.name.startswith("planar"))
+    assert flat.degrees_of_freedom == made.model_levels[-1].degrees_of_freedom - 1
     assert flat.error is not None and flat.error < 1e-7
     assert made.reference.measure == "positions of all bodies and ends"
 
@@ -147,10 +147,10 @@ def test_levels_that_a_scene_does_not_allow_are_told() -> None:
         hub(drag=0.1), T_END, methods=["dop853"], models=True, samples=SAMPLES, rounds=0,
         budget=300, quantities=["blade.tip.y"],
     )  # fmt: skip
-    refused = {one.model for one in made.left_out if one.refused}
+    refused = {one.model for one in made.skipped if one.is_unsupported}
     assert refused == {"rigid", "one-way, 1 shape", "one-way, 2 shapes"}
-    assert all("viscous_drag" in one.reason for one in made.left_out if one.refused)
-    assert not refused & {level.name for level in made.levels}
+    assert all("viscous_drag" in one.reason for one in made.skipped if one.is_unsupported)
+    assert not refused & {level.name for level in made.model_levels}
 
 
 def test_quantities_that_a_level_does_not_have() -> None:
@@ -158,7 +158,7 @@ def test_quantities_that_a_level_does_not_have() -> None:
         hub(), 0.1, methods=["dop853"], models=True, samples=3, rounds=0, budget=300,
         quantities=["blade.y2"],
     )  # fmt: skip
-    refused = {one.model: one.reason for one in made.left_out if one.refused}
+    refused = {one.model: one.reason for one in made.skipped if one.is_unsupported}
     assert "rigid" in refused and "linear, 1 shape" in refused
     assert 'quantity "blade.y2"' in refused["rigid"]
 
@@ -168,6 +168,6 @@ def test_a_scene_of_rigid_bodies_has_one_level() -> None:
     made = mstmm.chart(
         pendulum(), 0.5, methods=["dop853"], models=True, samples=3, rounds=0, budget=300
     )
-    assert [level.name for level in made.levels] == ["rigid"]
-    (told,) = [one for one in made.left_out if one.refused]
+    assert [level.name for level in made.model_levels] == ["rigid"]
+    (told,) = [one for one in made.skipped if one.is_unsupported]
     assert "no model levels to compare: the scene has no flexible bodies" in str(told)

@@ -82,7 +82,7 @@ def test_the_page_stands_alone(made: Callable[[], Chart]) -> None:
     shown = [w for tag, w in page.words if tag == "title" and "CPU, smallest of" in w]
     inside = build_drawing(chart)
     assert len(shown) == sum(len(line.points) for line in inside.lines if line.look.mark)
-    for point in chart.front:
+    for point in chart.pareto_front:
         assert any(f"{point.method}, {point.setting}" in w and point.model in w for w in shown)
 
 
@@ -102,11 +102,13 @@ def test_every_point_that_ran_is_drawn_once() -> None:
             for (x, y), _ in line.points:
                 assert made.x[1] <= x <= made.x[0] or x < made.x[1]
                 assert made.y[0] <= y <= made.y[1]
-        assert len(made.front) == len([p for p in chart.front if plot_position(p) is not None])
+        assert len(made.pareto_front) == len(
+            [p for p in chart.pareto_front if plot_position(p) is not None]
+        )
 
 
 def test_wild_errors_do_not_shrink_the_rest() -> None:
-    wild = Point(Setting("rk4", "as given", 0.5, fixed=True), 1e40, 1e-5, 1, sure_error=1e40)
+    wild = Point(Setting("rk4", "as given", 0.5, fixed=True), 1e40, 1e-5, 1, error_bound=1e40)
     chart = replace(one_level(), points=(wild, *one_level().points))
     made = build_drawing(chart)
     assert made.x[0] < 10
@@ -124,9 +126,9 @@ def test_a_scene_at_rest_says_so(tmp_path: Path) -> None:
     assert "nothing moves in this scene" in said[-1]
     assert not made.points
     with pytest.raises(NumericalFailure, match="nothing moves in this scene"):
-        made.recommended(1e-3)
+        made.recommend(1e-3)
     assert made.to_dict()["reference"]["still"] is True
-    assert made.advice() == []
+    assert made.recommendations() == []
     assert build_drawing(made).empty == "nothing moves in this scene"
     assert not made.plot().axes[0].axison
     assert "Nothing moves in this scene" in made.to_html()
@@ -136,7 +138,7 @@ def test_a_scene_at_rest_says_so(tmp_path: Path) -> None:
 
 def test_long_words_below_the_title_are_not_cut() -> None:
     chart = one_level()
-    reference = replace(chart.reference, ended='stopped by event "end" at t = 0.5 s')
+    reference = replace(chart.reference, stop_event='stopped by event "end" at t = 0.5 s')
     figure = replace(chart, reference=reference).plot()
     lines = [text.get_text() for text in figure.texts]
     first = next(i for i, line in enumerate(lines) if line.startswith("1 s of motion"))
@@ -192,7 +194,7 @@ def test_the_picture(tmp_path: Path) -> None:
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
     assert width > 1000 and height > 700
     words = {text.get_text() for text in figure.texts}
-    assert {level.name for level in levels().levels} <= words
+    assert {level.name for level in levels().model_levels} <= words
     (axes,) = figure.axes
     assert axes.get_xlim()[0] > axes.get_xlim()[1]  # more accurate to the right
     with pytest.raises(SceneError, match=r"ends in \.png, \.svg or \.pdf"):

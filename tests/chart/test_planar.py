@@ -86,8 +86,8 @@ def test_a_chart_of_rigid_bodies_has_the_planar_level() -> None:
     made: Chart = mstmm.chart(
         thrown(), 1.0, methods=["dop853"], models=True, samples=11, rounds=0, budget=300
     )
-    assert [one.name for one in made.levels] == ["planar, rigid", "rigid"]
-    error = made.levels[0].error
+    assert [one.name for one in made.model_levels] == ["planar, rigid", "rigid"]
+    error = made.model_levels[0].error
     assert error is not None and error < 1e-10
     finest = min(p.error for p in made.points if p.model == "planar, rigid" and p.error is not None)
     assert finest < 1e-9

@@ -53,9 +53,9 @@ def test_the_budget_is_told_before_the_first_run() -> None:
 def test_what_time_leaves_out_is_told() -> None:
     """Every run takes two seconds of a hundred, the same at every repetition."""
     whole, part, same = (chart(100.0, each_run, []) for each_run in (0.0, 2.0, 2.0))
-    assert not whole.left_out
+    assert not whole.skipped
     assert 0 < len(part.points) < len(whole.points)
-    late = [one for one in part.left_out if "too little time left" in one.reason]
+    late = [one for one in part.skipped if "too little time left" in one.reason]
     assert {one.method for one in late} == set(METHODS)
     assert all(one.setting.endswith("and tighter") for one in late)
     ran = {(p.method, p.setting.value) for p in part.points}
@@ -70,7 +70,7 @@ def test_methods_that_refuse_a_scene_are_told() -> None:
     made = mstmm.chart(
         hub(), 0.1, methods=["dop853", "dttmm-classical"], samples=3, rounds=0, budget=300
     )
-    (refused,) = [one for one in made.left_out if one.refused]
+    (refused,) = [one for one in made.skipped if one.is_unsupported]
     assert refused.method == "dttmm-classical"
     assert "its matrices contain no efforts" in refused.reason
     assert {p.method for p in made.points} == {"dop853"}
@@ -133,5 +133,5 @@ def test_shares_of_the_budget() -> None:
     assert budget.share(SETTINGS) == pytest.approx(100 * SETTINGS / 6)
     assert budget.share(SETTINGS, waiting=300) == pytest.approx(100 * SETTINGS / 60)
     clock.now = 90.0
-    assert budget.left(SETTINGS) == 0.0
-    assert budget.left() == pytest.approx(10.0)
+    assert budget.remaining(SETTINGS) == 0.0
+    assert budget.remaining() == pytest.approx(10.0)

@@ -58,11 +58,11 @@ def test_a_chart_sees_what_lies_between_even_times() -> None:
     assert seen > 10 * coarse
     assert seen > 0.5 * whole
     assert made.samples > 101
-    assert "more where the motion is fast" in made.looked
-    assert made.looked in made.to_html()
-    assert made.to_dict()["times"] == made.looked
+    assert "more where the motion is fast" in made.sampling_text
+    assert made.sampling_text in made.to_html()
+    assert made.to_dict()["times"] == made.sampling_text
 
 
 def test_times_that_are_asked_for_are_kept() -> None:
     made = mstmm.chart(pendulum(), 1.0, methods=["dop853"], samples=7, rounds=0, budget=300)
-    assert (made.samples, made.looked) == (7, "7 equidistant times up to 1 s")
+    assert (made.samples, made.sampling_text) == (7, "7 equidistant times up to 1 s")

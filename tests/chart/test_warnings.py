@@ -38,14 +38,16 @@ def test_warnings_are_those_of_the_run() -> None:
     ran = [point for point in damped().points if point.error is not None]
     for point in ran:
         result = model.simulate(T_END, output_times=[0.0, T_END], **point.setting.options)
-        step = result.certificate.step
-        assert point.too_coarse == (step is not None and step.risk is not None)
-        assert not point.too_coarse or "too long for the fastest motion" in " ".join(point.warnings)
+        step = result.certificate.step_stability
+        assert point.is_too_coarse == (step is not None and step.risk is not None)
+        assert not point.is_too_coarse or "too long for the fastest motion" in " ".join(
+            point.warnings
+        )
     rk4 = [p for p in ran if p.method == "rk4"]
-    assert [p.setting.value for p in rk4 if p.too_coarse]
-    assert pytest.approx(5.2e-6) in [p.setting.value for p in rk4 if not p.too_coarse]
-    assert all(p.too_coarse == (p.setting.value > STABLE) for p in rk4)
-    assert not [point for point in damped().front if point.too_coarse]
+    assert [p.setting.value for p in rk4 if p.is_too_coarse]
+    assert pytest.approx(5.2e-6) in [p.setting.value for p in rk4 if not p.is_too_coarse]
+    assert all(p.is_too_coarse == (p.setting.value > STABLE) for p in rk4)
+    assert not [point for point in damped().pareto_front if point.is_too_coarse]
 
 
 def test_warnings_stand_beside_their_points() -> None:
@@ -63,7 +65,7 @@ def test_warnings_stand_beside_their_points() -> None:
 
 def test_a_step_that_is_too_long_is_never_recommended() -> None:
     """However near the run came."""
-    lucky = Point(Setting("rk4", "m", 0.1, True), 1e-6, 1e-4, 1, too_coarse=True)
+    lucky = Point(Setting("rk4", "m", 0.1, True), 1e-6, 1e-4, 1, is_too_coarse=True)
     slow = Point(Setting("dop853", "m", 1e-6), 1e-6, 1e-3, 1)
     found = bound_errors([lucky, slow], REFERENCE)
     assert [p.method for p in pareto_front(found)] == ["dop853"]
@@ -74,7 +76,7 @@ def test_a_step_that_is_too_long_is_never_recommended() -> None:
 
 def test_what_is_recommended_is_told_with_its_warnings() -> None:
     chart = mstmm.chart(pendulum(), 1.0, methods=["dop853"], samples=11, rounds=0, budget=300)
-    best = chart.recommended()
+    best = chart.recommend()
     other = replace(best, warnings=("beware",))
     shown = [other if p is best else p for p in chart.points]
     changed = replace(chart, points=tuple(shown))
@@ -120,11 +122,11 @@ def test_a_run_that_an_event_ends_is_told() -> None:
     made = mstmm.chart(
         stop, 3.0, methods=["dop853", "rk4"], rounds=0, budget=300, state=said.append
     )
-    assert 'stopped by event "low" at t = 0.328' in made.reference.ended
+    assert 'stopped by event "low" at t = 0.328' in made.reference.stop_event
     assert any("runs end before 3 s" in text for text in said)
     assert "Runs end before 3 s: stopped by event" in made.to_html()
-    assert made.to_dict()["reference"]["ended"] == made.reference.ended
-    assert made.looked.startswith("101 equidistant times up to 0.328")
+    assert made.to_dict()["reference"]["ended"] == made.reference.stop_event
+    assert made.sampling_text.startswith("101 equidistant times up to 0.328")
     assert all(p.error is not None for p in made.points if p.method == "dop853")
 
 
@@ -133,7 +135,7 @@ def test_arguments_that_say_nothing() -> None:
         mstmm.chart(pendulum(), 1.0, methods=[])
     for error in ("a", True, float("inf"), [1e-3]):
         with pytest.raises(SceneError, match=r"error = .*: expected a number above 0"):
-            damped().recommended(error)  # type: ignore[arg-type]
+            damped().recommend(error)  # type: ignore[arg-type]
 
 
 def test_no_reference_for_other_reasons_than_time() -> None:

@@ -119,10 +119,12 @@ def test_json_tells_what_loops_leave_free(mstmm: Command, folder: Path) -> None:
     assert reports[1]["loops"] is None
     assert (told["rows"], told["rank"], told["mobility"], told["nearby"]) == (10, 3, 1, 3)
     assert told["cut"] == ["top_b", "top_c"] and not told["singular"] and told["misfit"] is None
-    assert [(one["of"], one["direction"]) for one in told["dropped"]] == list(loops.redundant)
+    assert [(one["of"], one["direction"]) for one in told["dropped"]] == list(loops.redundant_rows)
     assert not any(one["momentary"] for one in told["dropped"]) and len(told["dropped"]) == 7
     assert not told["reactions_unique"]
-    assert {of: tuple(words) for of, words in told["not_unique"].items()} == loops.not_unique
+    assert {
+        of: tuple(words) for of, words in told["not_unique"].items()
+    } == loops.indeterminate_reactions
 
 
 def test_every_file_is_looked_at(mstmm: Command, folder: Path) -> None:

@@ -20,8 +20,8 @@ def test_it_says_what_was_reached(mstmm: Command, folder: Path) -> None:
     assert done.out.startswith("trusted: the error of all coordinates as asked for")
     assert "(1.0e-07 requested): by" in done.out
     assert max(map(len, done.out.splitlines())) <= 80
-    again = package.load_result(folder / "run.nc").error_estimate
-    assert again is not None and again.met and again.asked == 1e-7
+    again = package.load_result(folder / "run.nc").achieved_error
+    assert again is not None and again.is_met and again.target == 1e-7
 
 
 def test_json_has_the_estimate_and_its_runs(mstmm: Command) -> None:

@@ -143,7 +143,7 @@ def test_sessions_and_batches_meet_them() -> None:
     model = mstmm.compile(sliding("exp(-((h.q-5)/0.01)^2) > 0.5"), engine="looped")
     session = model.session()
     session.advance(20.0)
-    assert session.t == pytest.approx(5 - 0.01 * HALF, abs=1e-11) and session.stopped
+    assert session.t == pytest.approx(5 - 0.01 * HALF, abs=1e-11) and session.stop_reason
     start = np.zeros((2, 1)), np.array([[1.0], [-1.0]])
     batch = model.simulate_batch(start, t_end=10.0, output_times=[1.0, 10.0])
     assert "stopped by" in batch.messages[0] and "finished" in batch.messages[1]
@@ -196,7 +196,7 @@ def test_bounds_hold_between_two_looks(u: float) -> None:
         return np.array([u * t - 2 * t * t, u - 4 * t])
 
     def watched(t: float) -> Any:
-        return np.array(system.watched(t, state(t)))
+        return np.array(system.event_values(t, state(t)))
 
     def look(t: float) -> Any:
         watched(t)

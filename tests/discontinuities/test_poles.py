@@ -91,4 +91,4 @@ def test_what_can_be_passed_is_no_pole(text: str) -> None:
 
 def test_a_pole_beside_the_motion_is_a_doubt() -> None:
     (note,) = mapped("q*tan(pi*t)").notes
-    assert note.name == "pole" and note.doubt and "t = 0.5 s" in note.means
+    assert note.name == "pole" and note.invalidates and "t = 0.5 s" in note.description

@@ -43,7 +43,7 @@ def test_a_wall_turns_the_mass_back(method: str, width: float) -> None:
     assert result.success
     assert result.u[-1, 0] == pytest.approx(-1.0, abs=3e-6)
     assert result.q[-1, 0] == pytest.approx(inside, abs=2e-5)
-    assert result.statistics is not None and result.statistics.crossings == 2
+    assert result.statistics is not None and result.statistics.switch_crossings == 2
 
 
 @pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])
@@ -112,8 +112,8 @@ def test_a_motion_that_sticks_ends_with_a_reason(method: str) -> None:
     assert result.status is Status.TOO_MANY_STEPS and not result.success
     assert "no end in sight" in result.message
     assert "'sign(u)' (effort of hinge \"h\") chatters" in result.message
-    assert result.trajectory.last is not None
-    assert result.trajectory.last[0] == pytest.approx(0.0300, abs=2e-3)
+    assert result.trajectory.last_state is not None
+    assert result.trajectory.last_state[0] == pytest.approx(0.0300, abs=2e-3)
 
 
 def test_a_limit_of_steps_is_the_only_one() -> None:
@@ -126,7 +126,7 @@ def test_switches_passed_in_turn_are_all_met() -> None:
     """A relay drives the mass to and fro: the period is known."""
     result = moved("-sign(q)", 16.0, q=0.5, u=0.0)
     assert result.q[-1, 0] == pytest.approx(0.5 - 0.0, abs=1e-7)  # four periods of 4 s
-    assert result.statistics is not None and result.statistics.crossings == 8
+    assert result.statistics is not None and result.statistics.switch_crossings == 8
 
 
 def test_batches_meet_walls_as_single_runs_do() -> None:
@@ -138,7 +138,7 @@ def test_batches_meet_walls_as_single_runs_do() -> None:
 def test_scenes_that_do_not_switch_have_nothing_to_watch() -> None:
     model = mstmm.compile(scene("-3*q - 0.1*u*sin(t)"), engine="looped")
     result = model.simulate(2.0)
-    assert result.statistics is not None and result.statistics.crossings == 0
+    assert result.statistics is not None and result.statistics.switch_crossings == 0
     assert SceneSystem(model.looped).run.n_switches == 0
 
 
@@ -157,7 +157,7 @@ def test_a_run_is_cut_anywhere_bit_for_bit() -> None:
         systems.append(SceneSystem(model.looped))
         run = make_run(systems[-1], settings, *model.initial_state())
         run.restore(state)
-    assert whole.statistics.crossings > 5 and len(rows) > 50
+    assert whole.statistics.switch_crossings > 5 and len(rows) > 50
     assert np.array_equal(Samples.joined([*rows, run.samples]).y, whole.samples.y)
     assert run.statistics == whole.statistics
 

@@ -87,7 +87,7 @@ def test_a_linear_model_has_the_matrices_as_they_are(stiffness: Array) -> None:
     modes = linear.modes()
     for value in modes.eigenvalues:
         assert np.abs(known - value).min() < 1e-8 * np.abs(known).max()
-    assert modes.growing.any() == (known.real.max() > 0)
+    assert modes.unstable.any() == (known.real.max() > 0)
 
 
 def test_the_threshold_of_cross_coupling() -> None:
@@ -100,7 +100,7 @@ def test_the_threshold_of_cross_coupling() -> None:
         changed = model.with_parameters(
             {"bearing.stiffness[8]": part * limit, "bearing.stiffness[13]": -part * limit}
         )
-        assert changed.modes().growing.any() == growing
+        assert changed.modes().unstable.any() == growing
 
 
 def test_a_shaft_may_spin_in_a_bearing_without_moments() -> None:

@@ -117,7 +117,7 @@ def test_a_stop_in_a_four_bar(pin: str, cut: str) -> None:
     """Of one freedom all speeds turn round alike, whether the pin that is stopped is cut or not."""
     scene = linkage(cut, laws=False)
     start = model(scene)
-    place = start.layout.hinges[pin].q
+    place = start.coordinate_layout.hinges[pin].q
     begin, end = (float(x) for x in start.simulate(0.05).q[[0, -1], place])
     result = struck(scene, f"{pin}.q {'>' if end > begin else '<'} {end!r}", 0.4, 0.1)
     hit = int(np.flatnonzero(result.trajectory.event > 0)[0])

@@ -252,7 +252,7 @@ def test_loss_factor() -> None:
         omega, ["block.fx"], ["block.position.x"], structural={"mount": eta}
     )
     known = 1 / (k * (1 + 1j * eta) - omega**2 * MASS)
-    np.testing.assert_allclose(found.values[:, 0, 0], known, rtol=1e-9)
+    np.testing.assert_allclose(found.response[:, 0, 0], known, rtol=1e-9)
 
 
 def test_as_the_hinge_that_closes_a_loop() -> None:
@@ -276,11 +276,11 @@ def test_as_the_hinge_that_closes_a_loop() -> None:
         mstmm.compile(mstmm.Scene(**one)).simulate(0.5, rtol=1e-9, atol=1e-11)
         for one in (closed, tree)
     )
-    assert soft.coordinate("foot")[-1] == pytest.approx(rigid.coordinate("foot")[-1], abs=2e-5)
+    assert soft.coordinates("foot")[-1] == pytest.approx(rigid.coordinates("foot")[-1], abs=2e-5)
     known = rigid.force("tip")[-1]
     assert np.linalg.norm(known) > 1
     assert soft.quantity("rubber.force").values[-1] == pytest.approx(known, abs=2e-2)
-    give = soft.certificate.give
+    give = soft.certificate.spring_deflection
     assert give is not None
     assert (give.spring, give.stiffness) == ('bushing "rubber"', k)
 
@@ -298,7 +298,7 @@ def test_at_the_end_of_a_beam() -> None:
                       "position": [length, 0, 0], "stiffness": [0, k, 0, 0, 0, turning]}],
         )
     )  # fmt: skip
-    found = model.frequency_response([1e-7], ["blade.tip.fy"], ["blade.tip.y"]).values[0, 0, 0]
+    found = model.frequency_response([1e-7], ["blade.tip.fy"], ["blade.tip.y"]).response[0, 0, 0]
     own = ei * np.array([[12 / length**3, -6 / length**2], [-6 / length**2, 4 / length]])
     known = np.linalg.inv(own + np.diag([k, turning]))[0, 0]
     assert found.real == pytest.approx(known, rel=1e-8)

@@ -78,11 +78,11 @@ def test_a_rocker_between_stops(cut: str) -> None:
     for hit in np.flatnonzero(result.trajectory.event > 0):
         before, behind = result.u[hit - 1], result.u[hit]
         assert np.abs(behind + 0.7 * before).max() < 1e-12 * np.abs(before).max()
-    rocker = result.q[:, one.layout.hinges["end"].q]
+    rocker = result.q[:, one.coordinate_layout.hinges["end"].q]
     assert rocker.max() < 1.6 + 1e-12 and rocker.min() > 1.35 - 1e-12
     assert (result.trajectory.event > 0).sum() >= 2
     certificate = result.certificate
-    assert certificate.closure is not None and certificate.closure.gap < 1e-12
+    assert certificate.loop_closure is not None and certificate.loop_closure.gap < 1e-12
     assert certificate.energy.relative < 1e-8
 
 

@@ -200,7 +200,7 @@ def test_a_floating_chain_read_from_either_end() -> None:
             expected = getattr(here, quantity)(f"body{i}")
             assert worst(getattr(there, quantity)(f"body{i}"), expected) < 1e-9, quantity
     for i in range(2):
-        assert worst(-there.coordinate(f"pin{i}"), here.coordinate(f"pin{i}")) < 1e-9
+        assert worst(-there.coordinates(f"pin{i}"), here.coordinates(f"pin{i}")) < 1e-9
         assert worst(-there.force(f"pin{i}"), here.force(f"pin{i}")) < 1e-8
         assert worst(-there.moment(f"pin{i}"), here.moment(f"pin{i}")) < 1e-8
     assert worst(there.energy(), here.energy()) < 1e-10
@@ -253,7 +253,7 @@ def test_momentum_of_a_floating_tree(draw: int, rng: np.random.Generator) -> Non
     result = compiled(scene).simulate(0.3, rtol=1e-11, atol=1e-13, initial=(q, u))
     assert result.success, result.message
     for momentum in (result.momentum(), result.angular_momentum()):
-        scale = np.abs(momentum).max() + np.sqrt(result.energies()["kinetic"].max())
+        scale = np.abs(momentum).max() + np.sqrt(result.energy_components()["kinetic"].max())
         assert np.abs(momentum - momentum[0]).max() < 1e-8 * scale
     drifts = [drift.relative for drift in result.certificate.momentum]
     assert len(drifts) == 6
@@ -271,7 +271,9 @@ def test_energy_rate_is_the_power(draw: int, rng: np.random.Generator) -> None:
     )
     assert result.success, result.message
     energy = result.energy()
-    scale = np.abs(result.power()).max() * 0.02 + np.ptp(result.energies()["kinetic"]) + 1e-12
+    scale = (
+        np.abs(result.power()).max() * 0.02 + np.ptp(result.energy_components()["kinetic"]) + 1e-12
+    )
     assert np.abs(energy - energy[0] - result.work).max() < 1e-7 * scale
     assert result.certificate.energy.relative < 1e-7
 
@@ -286,7 +288,7 @@ def test_mass_matrix_is_the_hessian_of_the_kinetic_energy(
     for hinge in scene["hinge"]:
         inertia = hinge.get("law", {}).pop("inertia", None)
         if inertia is not None:
-            rotors[model.layout.hinges[hinge["name"]].u_slice] = inertia
+            rotors[model.coordinate_layout.hinges[hinge["name"]].u_slice] = inertia
     with_rotors, bare = model.mass_matrix(q), compiled(scene)
     matrix = bare.mass_matrix(q)
     size = np.abs(matrix).max(initial=1.0)
@@ -295,7 +297,7 @@ def test_mass_matrix_is_the_hessian_of_the_kinetic_energy(
 
     def kinetic(speeds: Array) -> float:
         state = bare.simulate(TIME, t_start=TIME, initial=(q, speeds))
-        return float(state.energies()["kinetic"][0])
+        return float(state.energy_components()["kinetic"][0])
 
     # Kinetic energy is a quadratic form: T(a + b) - T(a) - T(b) = a^T M b without truncation.
     other = rng.uniform(-1, 1, model.nu)
@@ -359,7 +361,7 @@ def test_partly_driven_hinges(kind: str, rng: np.random.Generator) -> None:
         assert worst(model.accelerations(q, u, TIME), expected.udot) < ACCURACY
         result = model.simulate(TIME, t_start=TIME, initial=(q, u))
         for hinge in found:
-            place = model.layout.hinges[hinge["name"]].u_slice
+            place = model.coordinate_layout.hinges[hinge["name"]].u_slice
             free = np.array([text == "free" for text in drive])
             effort = result.effort(hinge["name"])[0] - expected.effort[place]
             rotor = np.array(hinge.get("law", {}).get("inertia", np.zeros(len(free))))

@@ -188,12 +188,12 @@ def test_links_are_told_with_their_rotors_and_can_be_switched_off(rng: np.random
     assert set(told) == {("hinge0",), ("hinge1",), ("hinge2",), ("hinge3",)}
     assert 'type "pin" with rotor inertia' in told["hinge1",]
     assert 'type "ball":' in told["hinge2",]
-    assert linked(model.packed) == 4
+    assert linked(model.packed_scene) == 4
     q, u = model.initial_state()
     u = rng.uniform(-1, 1, len(u))
     for without in (False, ["welds"], {"links": False}):
         plain = mstmm.compile(mstmm.Scene(**scene), engine="looped", simplify=without)
-        assert not plain.simplifications and linked(plain.packed) == 0
+        assert not plain.simplifications and linked(plain.packed_scene) == 0
         assert worst(plain.accelerations(q, u), model.accelerations(q, u)) < ACCURACY
 
 

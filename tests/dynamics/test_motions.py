@@ -199,7 +199,7 @@ def test_twist_of_several_turns_is_an_oscillator(kind: str) -> None:
     assert np.abs(result.u[:, -1] - speed * np.cos(rate * times)).max() < 1e-8
     assert np.abs(result.effort("joint")[:, -1] + JOINTS[kind][-1] * twist).max() < 1e-9
     stored = 0.5 * JOINTS[kind][-1] * twist**2
-    assert np.abs(result.energies()["springs"] - stored).max() < 1e-9
+    assert np.abs(result.energy_components()["springs"] - stored).max() < 1e-9
 
 
 @pytest.mark.parametrize("kind", JOINTS)
@@ -214,12 +214,12 @@ def test_twist_with_swing_keeps_energy_and_momentum(kind: str) -> None:
     times = np.linspace(0, 12.0, 241)
     result = model.simulate(12.0, rtol=1e-11, atol=1e-12, output_times=times, initial=(q, u))
     assert result.success, result.message
-    twist = np.abs(unwrapped_twist(result.coordinate("joint")[:, -4:])).max()
+    twist = np.abs(unwrapped_twist(result.coordinates("joint")[:, -4:])).max()
     assert twist > 2 * 2 * np.pi
     energy, turning = result.energy(), result.angular_momentum()
     assert np.abs(energy - energy[0]).max() < 1e-8 * energy[0]
     assert np.abs(turning - turning[0]).max() < 1e-8 * np.abs(turning).max()
-    assert result.energies()["springs"].max() > 0.3 * energy[0]
+    assert result.energy_components()["springs"].max() > 0.3 * energy[0]
 
 
 def unwrapped_twist(quaternions: Array) -> Array:
@@ -239,6 +239,6 @@ def test_swing_of_a_ball_past_the_horizontal_keeps_its_energy() -> None:
     result = model.simulate(1.5, rtol=1e-11, atol=1e-12, initial=(q, u))
     assert result.success, result.message
     energy = result.energy()
-    assert np.abs(energy - energy[0]).max() < 1e-8 * result.energies()["kinetic"].max()
-    tilt = [attitude(e)[0, 0] for e in result.coordinate("hinge1")]
+    assert np.abs(energy - energy[0]).max() < 1e-8 * result.energy_components()["kinetic"].max()
+    tilt = [attitude(e)[0, 0] for e in result.coordinates("hinge1")]
     assert min(tilt) < 0

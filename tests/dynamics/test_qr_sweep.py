@@ -223,7 +223,7 @@ def test_no_fused_code_and_no_flexible_bodies() -> None:
     with pytest.raises(SceneError, match='sweep = "qr" has no fused code'):
         compiled(scene, engine="fused")
     assert (
-        compiled(scene).engine_choice
+        compiled(scene).engine_reason
         == "looped: the least-squares sweep exists only in the looped engine"
     )
     beam = {"name": "blade", "length": 1.0, "mass_per_length": 1.0, "bending_stiffness": 1.0}
@@ -274,7 +274,7 @@ def test_automatic_methods_stay_explicit() -> None:
     run = compiled(scene).simulate(0.2, "auto", rtol=1e-6)
     assert run.success
     assert [stretch.method for stretch in run.trajectory.methods] == ["dop853", "dop853"]
-    assert 'sweep = "qr" gives accelerations' in run.trajectory.methods[-1].why
+    assert 'sweep = "qr" gives accelerations' in run.trajectory.methods[-1].reason
     other = riccati(scene).simulate(0.2, "auto", rtol=1e-6).trajectory.methods
     assert other[-1].method not in ("dop853", "dopri5")
 

@@ -34,7 +34,7 @@ def compiled(scene: dict[str, Any]) -> mstmm.Model:
 def equations(model: mstmm.Model, q: Array, u: Array) -> tuple[KernelIR, Arrays]:
     """The fused kernel of a model, with every number of the scene baked in, and its inputs."""
     structure, p = structure_of(system_of(model.scene, model.known)[0], model.known or {})
-    kernel = model.fusion.fused(structure).kernels["accelerations"]
+    kernel = model.fusion.structure_ir(structure).kernels["accelerations"]
     still = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * model.nu}
     return kernel, {"p": list(p), "t": [TIME], "q": list(q), "u": list(u), **still}
 

@@ -79,7 +79,7 @@ def test_nan_is_not_taken_for_missing_inertia() -> None:
     with pytest.raises(mstmm.NumericalFailure, match='load "wind"') as refused:
         model.accelerations(*model.initial_state())
     assert "inertia" not in str(refused.value)
-    model.refuse_undetermined_start()
+    model.check_start_determined()
 
 
 @pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])

@@ -34,7 +34,7 @@ def test_rotors_add_to_the_mass_matrix(kind: str, every: int, rng: np.random.Gen
     rotors = [0.2 * (1 + i % 4) if i % every == 0 else 0.0 for i in range(BODIES)]
     model = mstmm.compile(chain(kind, rotors), engine="looped")
     plain = mstmm.compile(chain(kind, [0.0] * BODIES), engine="looped")
-    runs = model.packed.written.model
+    runs = model.packed_scene.written.model
     assert runs.n_runs == (1 if every == 1 else 6)
     assert all(runs.runs[k].numbers for k in range(runs.n_runs))
     for _ in range(5):

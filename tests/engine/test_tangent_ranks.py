@@ -88,16 +88,16 @@ def test_columns_that_pass_the_middle(name: str, rng: np.random.Generator) -> No
 def state(model: mstmm.Model, rng: np.random.Generator) -> Array:
     """Coordinates drawn, quaternions of length 1, modes small."""
     q = rng.normal(size=model.nq)
-    for first in model.layout.quaternions:
+    for first in model.coordinate_layout.quaternions:
         q[first : first + 4] /= np.linalg.norm(q[first : first + 4])
-    for modes in model.layout.modal.values():
+    for modes in model.coordinate_layout.modal.values():
         q[modes.q_slice] *= 1e-2
     return q
 
 
 def halves(model: mstmm.Model) -> tuple[list[int], list[int]]:
     """Speeds inboard and outboard of the middle hinge, modes with their body."""
-    names = model.layout.u_names
+    names = model.coordinate_layout.u_names
     number = [int("".join(c for c in name.split(".")[0] if c.isdigit())) for name in names]
     middle = (max(number) + 1) // 2
     return (

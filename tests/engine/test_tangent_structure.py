@@ -42,7 +42,7 @@ def test_driven_coordinates_do_not_answer() -> None:
     scene = random_scene(5, types=("pin",), laws=False, loads=False, chain=True, most=4)
     scene["hinge"][0]["drive"] = "0.3*sin(2*t)"
     model = compiled(scene)
-    driven = model.layout.hinges[scene["hinge"][0]["name"]].u
+    driven = model.coordinate_layout.hinges[scene["hinge"][0]["name"]].u
     free = [k for k in range(model.nu) if k != driven]
     q, u = model.initial_state()
     t, step = 0.4, 1e-5
@@ -54,7 +54,7 @@ def test_driven_coordinates_do_not_answer() -> None:
     ahead, behind = (model.accelerations(q, u, t + s) for s in (step, -step))
     assert worst(found.t, (ahead - behind) / (2 * step)) < 1e-7
     moved = np.array(q)
-    moved[model.layout.hinges[scene["hinge"][0]["name"]].q] = 0.3 * np.sin(2 * t)
+    moved[model.coordinate_layout.hinges[scene["hinge"][0]["name"]].q] = 0.3 * np.sin(2 * t)
     mass = model.mass_matrix(moved)[np.ix_(free, free)]
     assert worst(found.efforts[np.ix_(free, free)] @ mass, np.eye(len(free))) < 1e-11
 
@@ -72,11 +72,11 @@ def test_increments_of_quaternions_turn_with_the_body() -> None:
     rng = np.random.default_rng(3)
     q, _ = model.initial_state()
     u = rng.normal(size=model.nu)
-    for start in model.layout.quaternions:
+    for start in model.coordinate_layout.quaternions:
         q[start : start + 4] = rng.normal(size=4)  # of any length
     found = model.derivatives(q, u)
     assert worst(found.rate_u, np.eye(model.nu)) < 1e-14
-    for slots in model.layout.hinges.values():
+    for slots in model.coordinate_layout.hinges.values():
         own = u[slots.u_slice]
         wanted = np.zeros((slots.nu, slots.nu))
         wanted[-3:, -3:] = -cross(own[-3:])
@@ -91,7 +91,7 @@ def test_the_length_of_a_quaternion_does_not_matter() -> None:
     scene, q, u = drawn(12, types=("ball", "free"), most=3)
     model = compiled(scene)
     longer = q.copy()
-    for start in model.layout.quaternions:
+    for start in model.coordinate_layout.quaternions:
         longer[start : start + 4] *= 1.7
     one, other = model.derivatives(q, u), model.derivatives(longer, u)
     for name in ("q", "u", "efforts", "rate_q"):

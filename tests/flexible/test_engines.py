@@ -35,8 +35,8 @@ class Interpreted:
     """
 
     def __init__(self, model: mstmm.Model, q: Array, u: Array) -> None:
-        structure, p = structure_of(model.packed.system, model.known or {})
-        self.kernel: KernelIR = model.fusion.fused(structure).kernels["accelerations"]
+        structure, p = structure_of(model.packed_scene.system, model.known or {})
+        self.kernel: KernelIR = model.fusion.structure_ir(structure).kernels["accelerations"]
         self.inputs: dict[str, Any] = {
             "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,
             "memory": [0.0] * structure.n_memory,
@@ -143,7 +143,7 @@ def test_derivatives_are_those_of_the_complex_step(draw: int, rng: Generator) ->
     ):
         wanted = complex_step(fused.kernel, fused.inputs, {name: direction})["udot"]
         assert worst(along, wanted, floor=1.0) < 1000 * fused.allowed, name
-    for slots in model.layout.modal.values():
+    for slots in model.coordinate_layout.modal.values():
         own = slots.u_slice
         assert np.array_equal(found.rate_u[own, own], np.eye(slots.nu))
         assert not found.rate_q[own].any()
@@ -194,7 +194,7 @@ def test_numbers_of_beams_are_parameters() -> None:
     name = scene["beam"][0]["name"]
     assert f"{name}.modes.y" not in model.parameters
     heavier = model.with_parameters({f"{name}.mass_per_length": 7.0})
-    assert heavier.flexible[name].mass == pytest.approx(7.0 * scene["beam"][0]["length"])
+    assert heavier.flexible_bodies[name].mass == pytest.approx(7.0 * scene["beam"][0]["length"])
     changed = {**scene, "beam": [{**scene["beam"][0], "mass_per_length": 7.0}, *scene["beam"][1:]]}
     expected = compiled(changed, "looped").accelerations(q, u, TIME)
     assert np.array_equal(heavier.accelerations(q, u, TIME), expected)
@@ -215,7 +215,7 @@ def test_compiling_is_weighed_by_modes() -> None:
         model = compiled(
             {"gravity": [0, 0, 0], "beam": [beam], "body": [rod], "hinge": pins}, "looped"
         )
-        fusion = Fusion(model.packed, {}, {})
+        fusion = Fusion(model.packed_scene, {}, {})
         counts.append(sorted(mode_counts(fusion.structure)))
         least.append(fusion._break_even() * sum(1 + 2 * n for n in counts[-1]))
     assert counts == [[0, 0, 1, 1], [0, 0, 8, 8]]  # held section, rod, frame, tip

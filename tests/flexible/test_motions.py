@@ -209,7 +209,10 @@ def thrown(data: Scene) -> tuple[Any, list[float]]:
         2.0, output_times=np.linspace(0.0, 2.0, 21), rtol=1e-9, atol=1e-11
     )
     assert result.success, result.message
-    velocity, spin = result.equivalent_velocity("javelin"), result.equivalent_spin("javelin")
+    velocity, spin = (
+        result.equivalent_velocity("javelin"),
+        result.equivalent_angular_velocity("javelin"),
+    )
     center = result.center_of_mass("javelin")
     return result, [*velocity[10, :2], spin[10, 2], *center[10, :2]]
 

@@ -42,8 +42,8 @@ def fused(scene: dict[str, Any], **options: Any) -> mstmm.Model:
 
 def interpreted(model: mstmm.Model, q: Array, u: Array) -> dict[str, Any]:
     """The fused IR with plain floats."""
-    structure, p = structure_of(model.packed.system, model.known or {})
-    found = model.fusion.fused(structure).kernels
+    structure, p = structure_of(model.packed_scene.system, model.known or {})
+    found = model.fusion.structure_ir(structure).kernels
     kernel = found.get("accelerations_power", found["accelerations"])
     inputs = {
         "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,

@@ -34,7 +34,7 @@ class Fused:
 
     def __init__(self, model: mstmm.Model, memory: Array, q: Array, u: Array, a: Array) -> None:
         assert isinstance(model.fusion, Fusion)
-        structure, p = structure_of(model.packed.system, model.known or {})
+        structure, p = structure_of(model.packed_scene.system, model.known or {})
         self.kernels = model.fusion.fused_implicit(structure).kernels
         self.state: dict[str, Any] = {
             "p": p, "t": [TIME], "q": q, "u": u, "a": a, "steps": STEPS,
@@ -144,7 +144,7 @@ def test_runs_equal_those_of_the_looped_engine(method: str) -> None:
         by(engine, arm(4), method, step=2e-3, tangent="exact") for engine in ("fused", "looped")
     )
     assert fused.success and looped.success
-    errors = [run.statistics and run.statistics.sum_local_error for run in (fused, looped)]
+    errors = [run.statistics and run.statistics.sum_of_local_errors for run in (fused, looped)]
     assert errors[0] == pytest.approx(errors[1], rel=1e-3)
     assert fused.q == pytest.approx(looped.q, abs=1e-9)
     assert fused.u == pytest.approx(looped.u, abs=1e-6)

@@ -38,7 +38,7 @@ def beams() -> dict[str, Any]:
 def replayed(model: mstmm.Model, q: Array, u: Array, a: Array) -> dict[str, Array]:
     """What the kernels give."""
     assert isinstance(model.fusion, Fusion)
-    structure, p = structure_of(model.packed.system, model.known or {})
+    structure, p = structure_of(model.packed_scene.system, model.known or {})
     state: dict[str, Any] = {
         "p": p, "t": [TIME], "q": q, "u": u, "a": a, "memory": np.zeros(structure.n_memory),
     }  # fmt: skip

@@ -39,15 +39,15 @@ def model() -> mstmm.Model:
 
 
 def text_of(model: mstmm.Model, part: str) -> str:
-    structure, _ = structure_of(model.packed.system, model.known or {})
-    return fused_sources(model.fusion.fused(structure), KEY, part)["fused.c"]
+    structure, _ = structure_of(model.packed_scene.system, model.known or {})
+    return fused_sources(model.fusion.structure_ir(structure), KEY, part)["fused.c"]
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_one_state_and_many(
     compiler: str, model: mstmm.Model, tmp_path: Path, rng: np.random.Generator
 ) -> None:
-    _, p = structure_of(model.packed.system, model.known or {})
+    _, p = structure_of(model.packed_scene.system, model.known or {})
     (tmp_path / "lanes").mkdir()
     scalar = open_library(compiled(text_of(model, "scalar"), tmp_path, compiler), KEY)
     lanes = open_library(compiled(text_of(model, "lanes"), tmp_path / "lanes", compiler), KEY)
@@ -57,7 +57,7 @@ def test_one_state_and_many(
     size = np.abs(wanted).max(axis=1, keepdims=True)
     memory, none = np.zeros(max(1, scalar.n_memory)), np.zeros(model.nu)
     udot, qdot = np.empty_like(u), np.empty_like(q)
-    assert not lanes.many(p, np.zeros(1), q, u, memory, None, udot, qdot).any()
+    assert not lanes.accelerations_batch(p, np.zeros(1), q, u, memory, None, udot, qdot).any()
     assert (np.abs(udot - wanted) / size).max() < 1e-13
     for k in range(len(q)):
         code, rates, one = scalar.evaluate(p, 0.0, q[k], u[k], memory, none)
@@ -70,7 +70,7 @@ def test_one_state_and_many(
 
 def test_every_state_may_have_its_own_row(model: mstmm.Model, tmp_path: Path) -> None:
     """Strides of p, t, memory and efforts: a row for each state equals one row for all."""
-    _, p = structure_of(model.packed.system, model.known or {})
+    _, p = structure_of(model.packed_scene.system, model.known or {})
     library = open_library(compiled(text_of(model, "lanes"), tmp_path), KEY)
     q0, u0 = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(2))
     n = 5
@@ -80,16 +80,16 @@ def test_every_state_may_have_its_own_row(model: mstmm.Model, tmp_path: Path) ->
     numbers[3] *= 1.5
     efforts = np.zeros_like(u)
     efforts[1] = 2.0
-    library.many(
+    library.accelerations_batch(
         numbers, np.arange(5.0), q, u, np.tile(memory, (n, 1)), efforts, rows
     )  # nothing here depends on time
-    library.many(p, np.zeros(1), q, u, memory, None, shared)
+    library.accelerations_batch(p, np.zeros(1), q, u, memory, None, shared)
     same = [row.tobytes() == shared[0].tobytes() for row in rows]
     assert same == [True, False, True, False, True]
 
 
 def test_prepared_calls(model: mstmm.Model, tmp_path: Path) -> None:
-    _, p = structure_of(model.packed.system, model.known or {})
+    _, p = structure_of(model.packed_scene.system, model.known or {})
     library = open_library(compiled(text_of(model, "scalar"), tmp_path), KEY)
     q, u = drawn_state(chain(MIXED, skew=0.4), np.random.default_rng(3))
     call = SingleStateCall(library, p)

@@ -33,8 +33,8 @@ def apart(found: Array, expected: Array) -> float:
 def replayed(model: mstmm.Model, of: str, q: Array, u: Array) -> dict[str, Array]:
     """What the kernels give."""
     assert isinstance(model.fusion, Fusion)
-    structure, p = structure_of(model.packed.system, model.known or {})
-    body, axes, offset = model.packed.end(of)
+    structure, p = structure_of(model.packed_scene.system, model.known or {})
+    body, axes, offset = model.packed_scene.end(of)
     state: dict[str, Any] = {
         "p": p, "t": [0.0], "q": q, "u": u, "memory": np.zeros(structure.n_memory),
         "end": [*offset, *axes],

@@ -39,8 +39,8 @@ def chain(
 
 def kernel(scene: mstmm.Scene) -> KernelIR:
     model = mstmm.compile(scene, engine="looped")
-    structure, _ = structure_of(model.packed.system, model.known or {})
-    found: KernelIR = model.fusion.fused(structure).kernels["accelerations"]
+    structure, _ = structure_of(model.packed_scene.system, model.known or {})
+    found: KernelIR = model.fusion.structure_ir(structure).kernels["accelerations"]
     return found
 
 
@@ -82,7 +82,7 @@ def test_other_numbers_need_no_compiler_and_structural_zeros_do(monkeypatch: Any
     # A damper where there was none is another structure: without a compiler the model says so.
     damped = model.with_parameters({"h1.law.damping": 2.0})
     assert damped.engine == "looped"
-    assert "compiler" in damped.engine_choice
+    assert "compiler" in damped.engine_reason
     monkeypatch.delenv("CC")
     compiled = model.with_parameters({"h1.law.damping": 2.0})
     assert compiled.engine == "fused"
@@ -100,7 +100,7 @@ def test_numbers_of_expressions_are_no_structure() -> None:
     found = []
     for force in ("10*cos(3*t)", "4*cos(5*t)"):
         looped = mstmm.compile(loaded(force), engine="looped")
-        structure, _ = structure_of(looped.packed.system, {})
+        structure, _ = structure_of(looped.packed_scene.system, {})
         found.append(structure.identity())
         fused = mstmm.compile(loaded(force), engine="fused")
         np.testing.assert_allclose(
@@ -116,14 +116,14 @@ def test_auto_compiles_only_what_pays() -> None:
     scene = chain(3, {"type": "pin", "axis": [1, 0, 0]}, FULL, [0.1, 0.2, -9.81])
     model = mstmm.compile(scene)
     assert model.engine == "looped"
-    assert "long run" in model.engine_choice
+    assert "long run" in model.engine_reason
     assert model.fusion.ready(10) is None
     assert model.fusion.ready(1e9) is not None
     assert model.engine == "fused"
-    assert "compiled" in model.engine_choice
+    assert "compiled" in model.engine_reason
     again = mstmm.compile(scene)  # from now on it is in the cache
     assert again.engine == "fused"
-    assert "cache" in again.engine_choice
+    assert "cache" in again.engine_reason
 
 
 def released() -> mstmm.Scene:
@@ -140,14 +140,14 @@ def test_what_cannot_be_fused_says_why(scene: Any, reason: str) -> None:
     model = mstmm.compile(scene())
     assert model.fusion.ready(1e12) is None
     assert model.engine == "looped"
-    assert reason in model.engine_choice
+    assert reason in model.engine_reason
     with pytest.raises(SceneError, match=reason):
         mstmm.compile(scene(), engine="fused")
 
 
 def test_scenes_too_large_for_auto_are_fused_when_asked_for() -> None:
     large = chain(DEFAULT_MAX_BODIES + 1, PLANAR, FULL, [0, -9.81, 0])
-    assert "bodies" in mstmm.compile(large).engine_choice
+    assert "bodies" in mstmm.compile(large).engine_reason
     assert not Fusion(pack(large), {}, {}, most=MAX_BODIES).obstacle
 
 

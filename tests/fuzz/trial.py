@@ -182,7 +182,7 @@ def _silent(result: Result, everything: bool) -> str:
     numbers = {"q": result.q, "u": result.u, "t": result.t, "work": result.work}
     if everything:
         numbers |= {"udot": result.udot, "energy": result.energy(), "power": result.power()}
-        for name in result.names():
+        for name in result.quantity_names():
             try:
                 numbers[name] = np.asarray(result.quantity(name).values)
             except MstmmError:

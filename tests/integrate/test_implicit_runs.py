@@ -137,7 +137,7 @@ def test_a_stop_gives_back_no_more_than_it_took(lab: Lab, method: str, hw: float
         problem = lab.mechanism("stop", k)
         lab.lib.test_use_event(problem.system, b"gap")
         run = problem.solved(method, 20 * h, ((5.0 + phase) * h, -1.0), step=h)
-        assert run.statistics.crossings == 2
+        assert run.statistics.switch_crossings == 2
         rebounds.append(run.y[1])
     assert max(rebounds) < 1.05
     assert min(rebounds) > 0.95
@@ -182,7 +182,7 @@ def test_counts_are_those_of_the_method(lab: Lab) -> None:
     problem.system.n_error = 4  # the work is not asked
     run = problem.solved("rodas4p2", 1.0, start, rtol=1e-5)
     s = run.statistics
-    tries = s.steps + s.rejected
+    tries = s.steps + s.rejected_steps
     assert (s.tangents, s.iterations) == (tries, 0)
     # the first stage is common to both forms; both evaluate at the step's end, quadratures at its
     # middle; what it matters that accelerations carried to the end are off may take a solution
@@ -193,9 +193,9 @@ def test_counts_are_those_of_the_method(lab: Lab) -> None:
     assert (none, nothing) == (0, 0)
     assert tries <= carried + evaluated < 2 * tries
     assert 0 <= s.solves - tries - 5 * (carried + evaluated) <= carried
-    assert s.sum_local_error is not None
+    assert s.sum_of_local_errors is not None
     s = problem.solved("dttmm", 1.0, start, step=0.01).statistics
-    assert (s.tangents, s.solves, s.iterations, s.rejected) == (100, 100, 100, 0)
+    assert (s.tangents, s.solves, s.iterations, s.rejected_steps) == (100, 100, 100, 0)
     s = problem.solved("genalpha", 1.0, start, step=0.01).statistics
     assert s.solves == s.iterations
     assert s.tangents < 0.5 * s.steps
@@ -281,7 +281,7 @@ def test_what_does_not_converge_says_so(lab: Lab) -> None:
     assert np.all(np.isfinite(run.y))
     shorter = problem.run("genalpha", 2.0, (0.0, 0.1), rtol=1e-3, atol=1e-5)
     assert shorter.advance(60.0) is Status.FINISHED, shorter.message()
-    assert shorter.statistics.rejected > 0
+    assert shorter.statistics.rejected_steps > 0
     rosenbrock = problem.solved("rodas4p2", 2.0, (0.0, 0.1), rtol=1e-4, atol=1e-6)
     assert shorter.y[0] == pytest.approx(rosenbrock.y[0], abs=3e-3)
 

@@ -88,7 +88,7 @@ def test_a_lane_makes_the_steps_of_a_run_alone(lab: Lab, case: str, lanes: int) 
         counts, outcome = alone.statistics, batch.outcomes[i]
         assert outcome.status == Status.FINISHED
         found = (outcome.steps, outcome.rejected, outcome.evaluations)
-        assert found == (counts.steps, counts.rejected, counts.evaluations)
+        assert found == (counts.steps, counts.rejected_steps, counts.evaluations)
 
 
 def test_slices_of_time_change_nothing(lab: Lab) -> None:

@@ -106,21 +106,21 @@ def test_a_run_comes_back_for_signs_and_looks(lab: Lab) -> None:
     problem = lab.problem("stiff_spring", 4, 1e3, 1.0)
     run = problem.run("dop853", 1.0, [1.0, 0.0, 1.0, 0.0], rtol=1e-4)
     run.call_back(7)
-    assert run.advance(60.0) is Status.RUNNING and run.asked
+    assert run.advance(60.0) is Status.RUNNING and run.callback_requested
     assert run.signs == 7 <= run.statistics.stability_limited_steps
     assert run.last_step * 1e3 > 2.5
     steps = run.statistics.steps
     run.call_back(0, look=steps + 11)
-    assert run.advance(60.0) is Status.RUNNING and run.asked
+    assert run.advance(60.0) is Status.RUNNING and run.callback_requested
     assert run.statistics.steps == steps + 11
     run.call_back(0)
-    assert run.advance(60.0) is Status.FINISHED and not run.asked
+    assert run.advance(60.0) is Status.FINISHED and not run.callback_requested
 
 
 def test_short_steps_of_implicit_methods_are_signs(lab: Lab) -> None:
     run = lab.mechanism("pendulum", 2e3, 5.0).run("rodas4p2", 1.5, (0.0, 0.4, 0, 0, 0), rtol=1e-9)
     run.call_back(10, short_step=1.0)
-    assert run.advance(60.0) is Status.RUNNING and run.asked and run.signs == 10
+    assert run.advance(60.0) is Status.RUNNING and run.callback_requested and run.signs == 10
     run.call_back(20, short_step=1e-9)
     assert run.advance(60.0) is Status.FINISHED and run.signs == 0
 

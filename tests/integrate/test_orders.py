@@ -140,8 +140,8 @@ def test_an_adaptive_run_passes_a_break_smoothly(lab: Lab) -> None:
     without = problem.solved("dop853", 2.4, [0.0], **options)
     assert with_break.y[0] == pytest.approx(piecewise(2.4, 1.0), rel=1e-9)
     assert 1.0 in with_break.samples.t
-    assert with_break.statistics.rejected <= 1  # the first step, chosen too long
-    assert without.statistics.rejected > 5
+    assert with_break.statistics.rejected_steps <= 1  # the first step, chosen too long
+    assert without.statistics.rejected_steps > 5
 
 
 def test_the_right_hand_side_never_sees_a_break(lab: Lab) -> None:
@@ -163,7 +163,7 @@ def test_fixed_steps_stay_on_the_grid(lab: Lab) -> None:
     wanted = np.sort(np.concatenate([grid, [33.333, 100.05]]))
     assert np.array_equal(run.samples.t, wanted)
     assert run.statistics.smallest_step == pytest.approx(0.1, abs=1e-12)
-    assert run.statistics.sum_local_error is None
+    assert run.statistics.sum_of_local_errors is None
 
 
 def limits() -> list[tuple[float, float]]:

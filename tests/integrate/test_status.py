@@ -189,7 +189,7 @@ def test_the_stiffness_index_is_the_frequency_times_the_step(lab: Lab) -> None:
 def test_the_sum_of_local_errors_is_not_below_a_smooth_runs_error(lab: Lab) -> None:
     run = lab.problem("mixed", 2).solved("dopri5", 2.0, (1, 1), rtol=1e-7, atol=1e-7)
     exact = np.array([math.exp(math.sin(2.0)), 0.2])
-    total = run.statistics.sum_local_error
+    total = run.statistics.sum_of_local_errors
     assert total is not None
     assert np.abs(run.y - exact).max() < total < 1e-5
 

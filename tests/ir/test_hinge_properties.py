@@ -38,14 +38,14 @@ KNOWN: dict[str, tuple[tuple[int, ...], tuple[int, ...], bool, bool, bool, bool,
 
 def test_facts_of_the_built_in_hinges() -> None:
     found = {
-        name: (f.turns, f.slides, f.steady, f.axial, f.keeps_z, f.straight, f.quaternion)
+        name: (f.turns, f.slides, f.constant_subspace, f.axial, f.keeps_z, f.straight, f.quaternion)
         for name, f in builtin_hinges().items()
     }
     assert found == KNOWN
     assert all(facts.in_place for facts in builtin_hinges().values())
     assert [name for name, f in builtin_hinges().items() if f.welds] == ["fixed"]
     assert [name for name, f in builtin_hinges().items() if f.free_body] == ["elastic", "free"]
-    assert [name for name, f in builtin_hinges().items() if f.goes_anywhere] == [
+    assert [name for name, f in builtin_hinges().items() if f.is_free] == [
         "planar", "elastic", "free",
     ]  # fmt: skip
 
@@ -80,7 +80,7 @@ def odd(value: tuple[Assign, ...]) -> HingeProperties:
 def test_coordinates_that_fail_at_their_start() -> None:
     """Nothing is known there, and what asks says so instead of computing with it."""
     facts = odd((Assign(0, "div", (Constant("1"), Element("q", (0,)))),))
-    assert facts.varies == ("q00000",) and not facts.steady and facts.straight
+    assert facts.varies == ("q00000",) and not facts.constant_subspace and facts.straight
     assert facts.at_start()[0][0][0] == math.inf
     hinge = Hinge(name="h", type="odd", inboard="ground", outboard="b")
     assert initial_motion_axes(hinge) is None  # not known yet

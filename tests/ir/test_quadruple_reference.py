@@ -23,7 +23,7 @@ def reference(
     """The accelerations of a scene in quadruple precision, and the inputs of a state."""
     model = mstmm.compile(scene, engine="looped")
     structure, p = structure_of(system_of(scene, model.known)[0], model.known or {})
-    kernel = model.fusion.fused(structure).kernels["accelerations"]
+    kernel = model.fusion.structure_ir(structure).kernels["accelerations"]
     still = {"memory": [0.0] * structure.n_memory, "efforts": [0.0] * model.nu}
     inputs = {"p": p, "t": [t], "q": q, "u": u, **still}
     return ScalarKernel(kernel, "quadruple", folder), inputs

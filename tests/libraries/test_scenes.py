@@ -45,9 +45,9 @@ def test_fused_code_comes_from_the_compiler_then_from_the_cache(
     cache_folder: Path, scene: mstmm.Scene
 ) -> None:
     first = mstmm.compile(scene, engine="fused")
-    assert first.engine == "fused" and "compiled in" in first.engine_choice
+    assert first.engine == "fused" and "compiled in" in first.engine_reason
     again = mstmm.compile(scene)
-    assert again.engine == "fused" and "cache" in again.engine_choice
+    assert again.engine == "fused" and "cache" in again.engine_reason
     assert_right(first)
     assert_right(again)
     whole = [entry for entry in list_entries(cache_folder) if not entry.problem]
@@ -120,8 +120,8 @@ def test_everything_runs_on_the_looped_engine_and_says_so(
     model = mstmm.compile(scene)
     assert model.fusion.ready(MANY) is None
     assert model.engine == "looped"
-    assert model.engine_choice.startswith("looped: ") and said in model.engine_choice
-    assert "\n" not in model.engine_choice
+    assert model.engine_reason.startswith("looped: ") and said in model.engine_reason
+    assert "\n" not in model.engine_reason
     assert_right(model)
     assert model.simulate(0.5, rtol=1e-9).success
     with pytest.raises(mstmm.EnvironmentFailure, match=said):
@@ -141,7 +141,7 @@ def test_damaged_library_is_not_opened_but_built_again(
     (folder / "fused.so").write_bytes(content[: len(content) // 2] if cut else content)
     assert mstmm.compile(scene).engine == "looped"  # nobody waits for a compiler here
     model = mstmm.compile(scene, engine="fused")
-    assert "rebuilt" in model.engine_choice
+    assert "rebuilt" in model.engine_reason
     assert_right(model)
     assert {entry.problem for entry in list_entries(cache_folder)} == {""}
 

@@ -30,7 +30,7 @@ def generated(tmp_path_factory: pytest.TempPathFactory) -> Path:
         patch.setenv("MSTMM_KERNELS", str(folder))
         patch.delenv("CC", raising=False)
         (made,) = mstmm.generate_file(DEFINITIONS / "knee.py")
-    assert made.how == "compiled"
+    assert made.execution == "compiled"
     return folder
 
 
@@ -101,7 +101,11 @@ def test_failing_compiler_leaves_nothing(
     monkeypatch.setenv("MSTMM_KERNELS", str(tmp_path / "new"))
     monkeypatch.setenv("CC", str(false_compiler(tmp_path, "echo 'error: no luck' >&2; exit 1")))
     (made,) = mstmm.generate_file(DEFINITIONS / "knee.py")
-    assert made.how.startswith("interpreted") and "no luck" in made.how and "\n" not in made.how
+    assert (
+        made.execution.startswith("interpreted")
+        and "no luck" in made.execution
+        and "\n" not in made.execution
+    )
     left = {path.name for path in made.folder.iterdir() if not path.name.endswith(".lock")}
     assert left == {"definition.py", "element.json", "hinge_knee.c", "mstmm.h"}
 
@@ -112,7 +116,7 @@ def test_library_of_an_earlier_definition_goes(library: Path, tmp_path: Path) ->
     changed = tmp_path / "my_knee.py"
     changed.write_text(text.replace('title = "', 'title = "another '), encoding="utf-8")
     (made,) = mstmm.generate_file(changed)
-    assert "replacing" in made.how
+    assert "replacing" in made.execution
     assert not library.exists() and len(list(made.folder.glob("*/hinge_knee.so"))) == 1
     assert os.listdir(made.folder / "..") == ["hinge_knee"]
 

@@ -72,13 +72,13 @@ def test_code_finds_what_the_sweep_finds(name: str) -> None:
     scene, q, u = case_of(name)
     fused, looped = of_both_engines(scene)
     found, wanted = (model.linearize(q, u, TIME) for model in (fused, looped))
-    assert found.about is not None and wanted.about is None
+    assert found.compiled_state is not None and wanted.compiled_state is None
     for matrix in MATRICES:
         ours, theirs = getattr(found, matrix), getattr(wanted, matrix)
         assert worst(ours, theirs, floor=1.0) < 1e-12, matrix
-    np.testing.assert_allclose(found.state.a, wanted.state.a, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(found.state.udot, wanted.state.udot, rtol=1e-11, atol=1e-11)
     assert np.array_equal(found.M, found.M.T)
-    assert (found.turning is None) == (wanted.turning is None)
+    assert (found.rate_matrix is None) == (wanted.rate_matrix is None)
 
 
 def test_long_chains_are_left_to_the_sweep() -> None:
@@ -112,10 +112,10 @@ def test_code_is_compiled_once_so_many_states_pay(
     monkeypatch.setattr(compiled_linearisation, "_SECONDS_PER_PAIR", 1e-4)
     model = mstmm.compile(pendulum())
     by_sweep = 0
-    while model.linearize([0.2]).about is None:
+    while model.linearize([0.2]).compiled_state is None:
         by_sweep += 1
     assert 3 < by_sweep < 10
-    assert mstmm.compile(pendulum()).linearize([0.2]).about is not None  # from the cache
+    assert mstmm.compile(pendulum()).linearize([0.2]).compiled_state is not None  # from the cache
 
 
 def test_a_state_that_code_refuses_is_named_by_the_sweep() -> None:
@@ -124,7 +124,7 @@ def test_a_state_that_code_refuses_is_named_by_the_sweep() -> None:
               "law": {"stiffness": 5.0}}  # fmt: skip
     data = pendulum().model_dump(by_alias=True, exclude_none=True) | {"spring": [spring]}
     model = mstmm.compile(mstmm.Scene(**data), engine="fused")
-    assert model.linearize([0.1]).about is not None
+    assert model.linearize([0.1]).compiled_state is not None
     for made in (model.linearize, lambda q: model.derivatives(np.array(q), np.zeros(1))):
         with pytest.raises(mstmm.NumericalFailure, match='spring "rope"'):
             made([0.0])

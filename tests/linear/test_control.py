@@ -25,7 +25,7 @@ def test_frequency_responses_agree() -> None:
     assert system.state_labels[0] == "pin_angle" and system.nstates == 8
     omega = np.array([0.7, 3.0, 11.0])
     theirs = system(1j * omega)[:, :2].transpose(2, 0, 1)
-    ours = linear.frequency_response(omega, outputs=outputs).values
+    ours = linear.frequency_response(omega, outputs=outputs).response
     np.testing.assert_allclose(theirs, ours, rtol=1e-9, atol=1e-12)
 
 

@@ -23,14 +23,14 @@ def test_one_mass_with_a_loss_factor() -> None:
         omega = np.array([0.1, 5.0, 700.0])
         found = compiled(links).frequency_response(omega, ["s0.effort"], structural=eta)
         expected = 1 / (k * (1 + 1j * eta) + 1j * omega * damper - omega**2 * m)
-        np.testing.assert_allclose(found.values[:, 0, 0], expected, rtol=1e-12)
-    assert abs(found.values[1, 0, 0]) == pytest.approx(1 / (k * eta), rel=1e-12)
+        np.testing.assert_allclose(found.response[:, 0, 0], expected, rtol=1e-12)
+    assert abs(found.response[1, 0, 0]) == pytest.approx(1 / (k * eta), rel=1e-12)
 
 
 def test_two_masses_with_losses_of_their_own() -> None:
     (m1, k1), (m2, k2), losses = (3.0, 70.0), (1.0, 40.0), {"s0": 0.1, "s1": 0.02}
     model = compiled(masses((m1, k1, 0.0), (m2, k2, 0.0)))
-    found = model.frequency_response(OMEGA, ["s1.effort"], structural=losses).values[:, :, 0]
+    found = model.frequency_response(OMEGA, ["s1.effort"], structural=losses).response[:, :, 0]
     a, b = k1 * (1 + 0.1j), k2 * (1 + 0.02j)
     for w, values in zip(OMEGA, found, strict=True):
         # Displacements of each mass beside the one before: the effort pushes the second alone.
@@ -72,7 +72,7 @@ def of_mixed() -> Linear:
 
 def check(linear: Linear, added: Any, **damping: Any) -> None:
     """Beside a dense solution with `added` in its place in Z."""
-    found = linear.frequency_response(OMEGA, **damping).values
+    found = linear.frequency_response(OMEGA, **damping).response
     for w, values in zip(OMEGA, found, strict=True):
         z = linear.K + 1j * w * linear.C - w**2 * linear.M + added(w)
         expected = np.linalg.solve(z, linear.V)
@@ -80,17 +80,17 @@ def check(linear: Linear, added: Any, **damping: Any) -> None:
 
 
 def test_losses_of_all_that_is_elastic(of_mixed: Linear) -> None:
-    check(of_mixed, lambda _: 0.05j * of_mixed.elastic, structural=0.05)
+    check(of_mixed, lambda _: 0.05j * of_mixed.K_elastic, structural=0.05)
 
 
 def test_losses_of_some(of_mixed: Linear) -> None:
     """What one member loses is what its stiffness adds, tensions left as they are."""
     only_shapes = of_mixed._of_shapes(lambda body: body.K)
     check(of_mixed, lambda _: 0.3j * only_shapes, structural={"boom": 0.3})
-    springs = of_mixed.sprung
+    springs = of_mixed.K_springs
     check(of_mixed, lambda _: 0.2j * springs, structural={"stay": 0.2, "across": 0.2})
     stiff = np.array([0, 0, 6.0, 6.0, 0.0])
-    names = of_mixed.coordinates
+    names = of_mixed.coordinate_names
     for losses, factors in (({"tail": 0.1}, [0.1] * 3), ({"tail[1].hinge": 0.1}, [0, 0.1, 0])):
         lost = np.zeros((len(names), len(names)))
         for k, factor in enumerate(factors):
@@ -107,7 +107,7 @@ def test_modal_ratios_are_those_of_the_natural_motions(of_mixed: Linear) -> None
         u = of_mixed.M @ modes.shapes
         c = (u * (2 * zeta * modes.omega)) @ u.T
         check(of_mixed, lambda w, c=c: 1j * w * c, modal=ratios)
-        check(of_mixed, lambda w, c=c: 1j * w * c + 0.1j * of_mixed.elastic, modal=ratios,
+        check(of_mixed, lambda w, c=c: 1j * w * c + 0.1j * of_mixed.K_elastic, modal=ratios,
               structural=0.1)  # fmt: skip
 
 
@@ -118,7 +118,7 @@ def test_modal_damping_at_the_resonances_themselves(links: list[tuple[float, flo
     linear = model.linearize(inputs=["s0.effort"])
     modes = linear.modes()
     omega = np.array([*modes.omega, *(modes.omega * (1 + 1e-9))])
-    found = linear.frequency_response(omega, modal=0.01).values[:, :, 0]
+    found = linear.frequency_response(omega, modal=0.01).response[:, :, 0]
     pushed = modes.shapes.T @ linear.V[:, 0]
     for w, values in zip(omega, found, strict=True):
         amplitudes = pushed / (modes.omega**2 - w**2 + 0.02j * w * modes.omega)
@@ -130,7 +130,7 @@ def test_the_slowest_motions_of_many_are_damped_alone() -> None:
     linear = compiled(chain(500, 0.0)).linearize(np.zeros(500), inputs=["rope[499].hinge.effort"])
     modes = linear.modes(3)
     at = np.array([modes.omega[1], modes.omega[2] * 0.999])
-    found = linear.frequency_response(at, modal=[0.01, 0.02, 0.03]).values[:, :, 0]
+    found = linear.frequency_response(at, modal=[0.01, 0.02, 0.03]).response[:, :, 0]
     u = linear.M @ modes.shapes
     for w, values in zip(at, found, strict=True):
         c = (u * (2 * np.array([0.01, 0.02, 0.03]) * modes.omega)) @ u.T

@@ -41,12 +41,12 @@ def test_the_transmissibility_of_a_mount() -> None:
     s, h = 1j * omega, transmissibility(omega)
     inputs = ["base.displacement", "base.displacement_rate", "base.displacement_acceleration"]
     found = shaker().frequency_response(omega, inputs, ["mass.x", "mount.displacement", "mass.ax"])
-    assert found.inputs == tuple(inputs) and found.input_units == ("m", "m/s", "m/s2")
+    assert found.input_names == tuple(inputs) and found.input_units == ("m", "m/s", "m/s2")
     for k in range(3):
         expected = np.stack([h, h - 1, s**2 * h], axis=1) / (s**k)[:, None]
-        np.testing.assert_allclose(found.values[:, :, k], expected, rtol=1e-12)
+        np.testing.assert_allclose(found.response[:, :, k], expected, rtol=1e-12)
     own = shaker().frequency_response(omega, inputs[:1], ["base.displacement", "platform.vx"])
-    np.testing.assert_allclose(own.values[:, :, 0], np.stack([s**0, s], axis=1), rtol=1e-13)
+    np.testing.assert_allclose(own.response[:, :, 0], np.stack([s**0, s], axis=1), rtol=1e-13)
 
 
 def test_drives_are_states_behind_the_others() -> None:
@@ -55,12 +55,12 @@ def test_drives_are_states_behind_the_others() -> None:
                "law": {"stiffness": 30.0, "rest": 3.0, "damping": 1.5}}]  # fmt: skip
     model = shaker(spring=spring)
     linear = model.linearize([0, 0], inputs=["mass.fx", "base.displacement_acceleration"])
-    assert linear.driven == ("base.displacement",)
-    assert linear.states == (
+    assert linear.prescribed_coordinates == ("base.displacement",)
+    assert linear.state_names == (
         "mount.displacement", "mount.displacement'", "base.displacement", "base.displacement'",
     )  # fmt: skip
-    np.testing.assert_allclose(linear.K_driven, [[30.0]])
-    np.testing.assert_allclose(linear.C_driven, [[1.5]])
+    np.testing.assert_allclose(linear.K_prescribed, [[30.0]])
+    np.testing.assert_allclose(linear.C_prescribed, [[1.5]])
     np.testing.assert_allclose(linear.V, [[1.0, -M]])
     assert (linear.A.shape, linear.B.shape, linear.B_disturbances.shape) == ((4, 4), (4, 2), (4, 3))
     omega, outputs = np.array([0.5, 4.0, 30.0]), ["mass.x", "mass.vx", "mass.ax", "held.effort"]
@@ -68,8 +68,8 @@ def test_drives_are_states_behind_the_others() -> None:
     c, d = linear.output_matrices(outputs)
     s = 1j * omega
     absolute = (C * s + K) / (M * s**2 + (C + 1.5) * s + K + 30) / s**2
-    np.testing.assert_allclose(found.values[:, 0, 1], absolute, rtol=1e-12)
-    for at, ours in zip(s, found.values, strict=True):
+    np.testing.assert_allclose(found.response[:, 0, 1], absolute, rtol=1e-12)
+    for at, ours in zip(s, found.response, strict=True):
         dense = c @ np.linalg.solve(at * np.eye(4) - linear.A, linear.B) + d
         np.testing.assert_allclose(ours, dense, rtol=1e-11)
 
@@ -100,8 +100,8 @@ def test_columns_are_slopes_of_the_equations_with_the_drive_taken_out() -> None:
     data = model.scene.model_dump(by_alias=True, exclude_defaults=True)
     del data["hinge"][0]["drive"]
     free = mstmm.compile(mstmm.Scene(**data), engine="looped")
-    given = [linear.state.q, linear.state.u, linear.state.a]
-    for k, ours in enumerate((linear.K_driven, linear.C_driven, -linear.V)):
+    given = [linear.state.q, linear.state.u, linear.state.udot]
+    for k, ours in enumerate((linear.K_prescribed, linear.C_prescribed, -linear.V)):
         step = 1e-5 * np.eye(2)[0]
         ahead, behind = (
             free.inverse_dynamics(*[x + sign * step if j == k else x for j, x in enumerate(given)])
@@ -124,7 +124,7 @@ def test_a_run_that_is_shaken_a_little_goes_as_the_answer_says() -> None:
     times = np.linspace(80, 90, 101)
     run = model.simulate(90.0, output_times=times, initial=(rest, [0, 0]), rtol=1e-11, atol=1e-13)
     for k, name in enumerate(("swing.angle", "bob.tip.x")):
-        expected = size * (answer.values[0, k, 0] * np.exp(1j * omega * times)).imag
+        expected = size * (answer.response[0, k, 0] * np.exp(1j * omega * times)).imag
         found = run.quantity(name).values
         found = found - found.mean() - (expected - expected.mean())
         assert np.abs(found).max() < 2e-3 * np.abs(expected).max()
@@ -136,7 +136,7 @@ def test_ground_and_platform_agree() -> None:
     found = shaker().frequency_response(
         omega, ["base.displacement_acceleration", "ground.acceleration.x"], ["mount.displacement"]
     )
-    np.testing.assert_allclose(found.values[:, 0, 0], found.values[:, 0, 1], rtol=1e-12)
+    np.testing.assert_allclose(found.response[:, 0, 0], found.response[:, 0, 1], rtol=1e-12)
 
 
 def test_python_control_takes_them() -> None:
@@ -159,9 +159,9 @@ def test_an_input_that_a_drive_follows_is_its_motion() -> None:
     found = model.frequency_response([3.0], ["height", "other"], ["mass.x", "mass.vx"])
     assert found.input_units == ("mm", "")
     expected = np.array([[1e-3, 2], [3e-3j, 6j]])
-    np.testing.assert_allclose(found.values[0], expected, rtol=1e-12)
+    np.testing.assert_allclose(found.response[0], expected, rtol=1e-12)
     one = shaker().frequency_response([3.0], ["road", "base.displacement"], ["mass.x"])
-    np.testing.assert_array_equal(one.values[:, :, 0], one.values[:, :, 1])
+    np.testing.assert_array_equal(one.response[:, :, 0], one.response[:, :, 1])
     slide["drive"] = "height/1000*cos(t)"
     going = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     with pytest.raises(SceneError, match="goes by time besides"):
@@ -205,6 +205,6 @@ def test_an_input_in_an_output_counts_at_once_where_a_drive_follows_it() -> None
         input=[{"name": "z", "unit": "m", "rates": [0, 0]}],
         output=[{"name": "both", "of": "mass.x + 2*z"}, {"name": "own", "of": "z"}],
     ))  # fmt: skip
-    found = model.frequency_response([1.0], ["z"]).values[0, :, 0]
+    found = model.frequency_response([1.0], ["z"]).response[0, :, 0]
     spring = 4.0 + 0.1j
     assert np.abs(found - [spring / (spring - 1.0) + 2.0, 1.0]).max() < 1e-13

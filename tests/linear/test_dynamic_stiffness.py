@@ -48,8 +48,8 @@ def test_the_tip_of_a_cantilever() -> None:
         ({"modes": {"y": 1, "z": 1}}, turned, "boom.tip.fz", ["boom.tip.z", "boom.tip.wy"]),
     ):
         found = boom(beam, hinge).frequency_response(OMEGA, [push], shown, exact=True)
-        np.testing.assert_allclose(found.values[:, 0, 0], deflection, rtol=1e-11)
-        values = np.abs(found.values[:, 1, 0] / OMEGA)
+        np.testing.assert_allclose(found.response[:, 0, 0], deflection, rtol=1e-11)
+        values = np.abs(found.response[:, 1, 0] / OMEGA)
         np.testing.assert_allclose(values, np.abs(slope), rtol=1e-11)
 
 
@@ -58,10 +58,14 @@ def test_more_shapes_come_nearer() -> None:
     deflection, _ = cantilever(OMEGA[:2])
     ask = OMEGA[:2], ["boom.tip.fy"], ["boom.tip.y"]
     basis = {"basis": "clamped-free"}
-    errors = np.array([
-        boom({"modes": {"y": n}} | basis).frequency_response(*ask).values[:, 0, 0] / deflection - 1
-        for n in (4, 8, 16)
-    ])  # fmt: skip
+    errors = np.array(
+        [
+            boom({"modes": {"y": n}} | basis).frequency_response(*ask).response[:, 0, 0]
+            / deflection
+            - 1
+            for n in (4, 8, 16)
+        ]
+    )
     ratios = np.abs(errors[:-1] / errors[1:])
     assert (ratios > 7).all() and (ratios < 9).all()
 
@@ -74,7 +78,7 @@ def test_damping_makes_the_stiffness_complex() -> None:
         found = boom(damped).frequency_response(*ask, exact=["boom"], structural=structural)
         softened = 1 + 1j * loss + 1j * OMEGA[:3] * delay
         expected, _ = cantilever(OMEGA[:3], softened, drag)
-        np.testing.assert_allclose(found.values[:, 0, 0], expected, rtol=1e-11)
+        np.testing.assert_allclose(found.response[:, 0, 0], expected, rtol=1e-11)
 
 
 def test_a_beam_that_floats() -> None:
@@ -93,10 +97,10 @@ def test_a_beam_that_floats() -> None:
     with np.errstate(all="ignore"):
         expected = -(si * ch - co * sh) / (BENDING * beta**3 * (1 - co * ch))
     expected[0] = -4 / (MASS * LENGTH * omega[0] ** 2)
-    np.testing.assert_allclose(answer.values[:, 0, 0], expected, rtol=1e-9)
+    np.testing.assert_allclose(answer.response[:, 0, 0], expected, rtol=1e-9)
     alpha = np.sqrt(MASS / 1e4) * omega
     along = -1 / (1e4 * alpha * np.sin(alpha * LENGTH))
-    np.testing.assert_allclose(answer.values[:, 1, 1], along, rtol=1e-9)
+    np.testing.assert_allclose(answer.response[:, 1, 1], along, rtol=1e-9)
 
 
 def test_a_shaft_with_a_disk_and_a_rod_with_a_mass() -> None:
@@ -106,7 +110,7 @@ def test_a_shaft_with_a_disk_and_a_rod_with_a_mass() -> None:
              "axial_stiffness": axial, "polar_inertia_per_length": polar}  # fmt: skip
     disk = {"name": "disk", "mass": 0.4, "inertia": [0.02, 0.01, 0.01]}
     grip = {"name": "grip", "type": "fixed", "inboard": "boom.tip", "outboard": "disk"}
-    found = boom(table, {}, body=[disk], outboard=[grip]).exact_modes(6).omega
+    found = boom(table, {}, body=[disk], outboard=[grip]).dynamic_stiffness_modes(6).omega
     expected = []
     for inertia, stiffness, end in ((polar, twist, 0.02), (MASS, axial, 0.4)):
         for k in range(6):
@@ -142,14 +146,14 @@ def roots(function: Any, count: int, first: float) -> Any:
 def test_two_hundred_frequencies_of_a_cantilever(parts: int, digits: float) -> None:
     """cos x = -1 / cosh x; none missed, none twice, where determinants end at the eleventh."""
     expected = roots(lambda x: np.cos(x) + 1 / np.cosh(x), 200, np.pi / 2 + 0.2)
-    found = cut(parts).exact_modes(200)
-    assert found.complete and len(found) == 200
+    found = cut(parts).dynamic_stiffness_modes(200)
+    assert found.is_complete and len(found) == 200
     np.testing.assert_allclose(np.sqrt(found.omega), expected, rtol=digits)
 
 
 def test_pinned_and_free() -> None:
     """tan x = tanh x behind a motion of frequency 0."""
-    found = cut(1, type="pin", axis=[0, 0, 1]).exact_modes(60)
+    found = cut(1, type="pin", axis=[0, 0, 1]).dynamic_stiffness_modes(60)
     assert found.omega[0] == 0
     expected = roots(lambda x: np.sin(x) - np.tanh(x) * np.cos(x), 59, 5 * np.pi / 4)
     np.testing.assert_allclose(np.sqrt(found.omega[1:]), expected, rtol=1e-9)
@@ -159,7 +163,7 @@ def test_free_in_space_in_two_planes() -> None:
     """cos x cosh x = 1, every frequency twice, behind six motions of frequency 0."""
     space = {"name": "space", "type": "free"}
     turning = {"polar_inertia_per_length": 1e-3}
-    found = boom({"modes": {"y": 2, "z": 2}} | turning, space).exact_modes(26)
+    found = boom({"modes": {"y": 2, "z": 2}} | turning, space).dynamic_stiffness_modes(26)
     assert not found.omega[:6].any()
     expected = roots(lambda x: np.cos(x) - 1 / np.cosh(x), 10, 3 * np.pi / 2) / LENGTH
     omega = np.repeat(expected**2 * np.sqrt(BENDING / MASS), 2)
@@ -192,7 +196,7 @@ def span_stiffness(beta: float, count: int) -> Any:
 def test_rows_of_spans(count: int) -> None:
     """2 n - 1 motions below beta = 6.5, each where the assembly is singular; and answers."""
     model = mstmm.compile(spans(count), engine="looped")
-    beta = np.sqrt(model.exact_modes(2 * count).omega)
+    beta = np.sqrt(model.dynamic_stiffness_modes(2 * count).omega)
     assert beta[-2] < 6.5 < beta[-1]
     for x in beta[:: count // 4]:
         near = [np.linalg.slogdet(span_stiffness(x * (1 + e), count))[0] for e in (-1e-9, 1e-9)]
@@ -200,7 +204,7 @@ def test_rows_of_spans(count: int) -> None:
     at = np.array([2.0, 4.1, 6.0])
     k = count // 2
     push, shown = [f"beam{k}.tip.fy"], [f"beam{k - 2}.tip.y", f"mass{k + 1}.y"]
-    found = model.frequency_response(at**2, push, shown, exact=True).values[:, :, 0]
+    found = model.frequency_response(at**2, push, shown, exact=True).response[:, :, 0]
     for x, values in zip(at, found, strict=True):
         unit = np.zeros(2 * count)
         unit[2 * k] = 1.0
@@ -221,7 +225,7 @@ def test_hinges_with_laws_at_both_ends_and_bodies_outboard() -> None:
     found = model.frequency_response(
         OMEGA[:3], ["wrist.effort"], ["foot.angle", "boom.tip.y", "wrist.angle"], exact=True
     )
-    for w, values in zip(OMEGA[:3], found.values[:, :, 0], strict=True):
+    for w, values in zip(OMEGA[:3], found.response[:, :, 0], strict=True):
         z, by = (MASS * w**2 / BENDING) ** 0.25 * LENGTH, [1, LENGTH, 1, LENGTH]
         beam = span_free(z) * np.outer(by, by) * BENDING / LENGTH**3
         # Unknown: angle of the root, deflection and angle of the tip, angle of the rod.
@@ -287,13 +291,13 @@ def test_motions_that_cannot_be_counted() -> None:
               "law": {"stiffness": 9.0, "rest": 1.0}}  # fmt: skip
     joined = boom({}, {}, body=[block], outboard=[rail], spring=[across])
     pushed = joined.frequency_response([1.0], ["boom.tip.fy", "rail.effort"], exact=True)
-    assert pushed.values.shape == (1, 1, 2)
+    assert pushed.response.shape == (1, 1, 2)
     with pytest.raises(SceneError, match="reach across the tree"):
-        joined.exact_modes(2)
+        joined.dynamic_stiffness_modes(2)
     still = boom({})
     for count in (0, 1.5, True):
         with pytest.raises(SceneError, match="a number of motions, 1 or more"):
-            still.exact_modes(count)  # type: ignore[arg-type]
+            still.dynamic_stiffness_modes(count)  # type: ignore[arg-type]
     moving = boom({}, {"type": "pin", "axis": [0, 0, 1]}).linearize(None, [1.0, 0, 0, 0])
     with pytest.raises(SceneError, match="this state moves"):
         moving.frequency_response([1.0], exact=True)

@@ -27,7 +27,7 @@ def test_a_tip_gives_way_by_a_third() -> None:
     """F L^3 / 3 E I, pushed almost at rest, and a moment M L / E I for the slope."""
     model = cantilever()
     found = model.frequency_response([1e-3], ["beam.tip.fy", "beam.tip.mz"], ["beam.tip.y"])
-    np.testing.assert_allclose(found.values[0, 0], [1 / 3, 1 / 2], rtol=1e-2)
+    np.testing.assert_allclose(found.response[0, 0], [1 / 3, 1 / 2], rtol=1e-2)
     loaded = cantilever(load=[{"on": "beam.tip", "force": [0, 0, 0]}])
     ours, theirs = (x.linearize(inputs=["beam.tip.fy"]).V for x in (model, loaded))
     np.testing.assert_allclose(ours, theirs, atol=1e-14)
@@ -54,9 +54,9 @@ def test_the_tip_of_a_panel() -> None:
 def test_an_output_of_the_scene_is_the_quantity_that_it_names() -> None:
     outputs = [{"name": "sway", "of": "beam.tip.y"}]
     linear = cantilever(output=outputs).linearize(inputs=["beam.tip.fy"])
-    ours = linear.frequency_response([1.0], outputs=["sway"]).values
+    ours = linear.frequency_response([1.0], outputs=["sway"]).response
     np.testing.assert_allclose(
-        ours, linear.frequency_response([1.0], outputs=["beam.tip.y"]).values
+        ours, linear.frequency_response([1.0], outputs=["beam.tip.y"]).response
     )
     with pytest.raises(SceneError, match="expected a list of names"):
         linear.output_matrices("sway")
@@ -74,15 +74,15 @@ def test_an_output_that_is_an_expression_goes_by_its_slope() -> None:
     omega, x = np.array([0.5, 4.0, 20.0]), np.sin(q)
     assert 0.3 < q < 0.4
     response = linear.frequency_response(omega, outputs=["mixed", "pivot.angle", "still"])
-    assert response.output_units[0] == "m" and not response.values[:, 2].any()
+    assert response.output_units[0] == "m" and not response.response[:, 2].any()
     slope = x * np.cos(q) / np.sqrt(x**2 + 2) + 3j * omega + 2 * np.cos(q) + x * omega**2 * x
     np.testing.assert_allclose(
-        response.values[:, 0, 0], slope * response.values[:, 1, 0], rtol=1e-10
+        response.response[:, 0, 0], slope * response.response[:, 1, 0], rtol=1e-10
     )
     system = linear.output_matrices(["mixed"])
     states = 1j * omega[:, None, None] * np.eye(2) - linear.A
     found = system[0] @ np.linalg.solve(states, linear.B[None]) + system[1]
-    np.testing.assert_allclose(found[:, 0, 0], response.values[:, 0, 0], rtol=1e-10)
+    np.testing.assert_allclose(found[:, 0, 0], response.response[:, 0, 0], rtol=1e-10)
 
 
 def test_outputs_without_a_slope_are_named() -> None:
@@ -111,7 +111,7 @@ def two_masses() -> mstmm.Scene:
 
 def test_springs_have_their_own_part_of_the_strain() -> None:
     modes = mstmm.compile(two_masses()).modes()
-    strain, shape = modes.strain(), modes.shapes
+    strain, shape = modes.strain_energy_shares(), modes.shapes
     held, between = 10 * shape[0] ** 2, 5 * (shape[1] - shape[0]) ** 2
     np.testing.assert_allclose(strain["springs"], between / (held + between), atol=1e-12)
     np.testing.assert_allclose(strain["on_a"], held / (held + between), atol=1e-12)

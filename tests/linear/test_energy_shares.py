@@ -65,17 +65,17 @@ def test_a_share_is_what_the_mass_matrix_gains_where_a_body_weighs_twice(
 
     assert np.iscomplexobj(x) == (damping > 0)
     expected = square(heavier) / square(modes.linear.M)
-    np.testing.assert_allclose(modes.kinetic()[body], expected, rtol=1e-9, atol=1e-13)
-    np.testing.assert_allclose(sum(modes.kinetic().values()), 1.0, rtol=1e-13)
+    np.testing.assert_allclose(modes.kinetic_energy_shares()[body], expected, rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(sum(modes.kinetic_energy_shares().values()), 1.0, rtol=1e-13)
 
 
 def test_masses_of_many_carry_the_squares_of_their_places() -> None:
     modes = mstmm.compile(masses(500, 0.5, 200.0), engine="looped").modes(3)
     places = np.cumsum(modes.shapes, axis=0)
-    shares = modes.kinetic()
+    shares = modes.kinetic_energy_shares()
     assert list(shares)[7] == "row[7]"
     np.testing.assert_allclose(list(shares.values()), 0.5 * places**2, atol=1e-12)
-    strained = modes.strain()
+    strained = modes.strain_energy_shares()
     stretch = modes.shapes**2 / (modes.shapes**2).sum(axis=0)
     np.testing.assert_allclose(list(strained.values()), stretch, atol=1e-12)
 
@@ -83,13 +83,22 @@ def test_masses_of_many_carry_the_squares_of_their_places() -> None:
 def test_shares_are_written(tmp_path: Path) -> None:
     modes = modes_of(0.0)
     data = modes.to_dict()
-    assert data["kinetic"]["boom"] == modes.kinetic()["boom"].tolist()
-    assert data["strain"]["slew"] == modes.strain()["slew"].tolist()
+    assert data["kinetic"]["boom"] == modes.kinetic_energy_shares()["boom"].tolist()
+    assert data["strain"]["slew"] == modes.strain_energy_shares()["slew"].tolist()
     head, first = list(csv.reader(modes.save(tmp_path / "modes.csv").read_text().splitlines()))[:2]
-    assert float(first[head.index("kinetic energy of load")]) == modes.kinetic()["load"][0]
-    assert float(first[head.index("strain energy of boom")]) == modes.strain()["boom"][0]
+    assert (
+        float(first[head.index("kinetic energy of load")])
+        == modes.kinetic_energy_shares()["load"][0]
+    )
+    assert (
+        float(first[head.index("strain energy of boom")]) == modes.strain_energy_shares()["boom"][0]
+    )
     xarray = pytest.importorskip("xarray")
     pytest.importorskip("h5netcdf")
     with xarray.open_dataset(modes.save(tmp_path / "modes.nc"), engine="h5netcdf") as found:
-        np.testing.assert_array_equal(found.kinetic.sel(body="hub"), modes.kinetic()["hub"])
-        np.testing.assert_array_equal(found.strain.sel(owner="slew"), modes.strain()["slew"])
+        np.testing.assert_array_equal(
+            found.kinetic.sel(body="hub"), modes.kinetic_energy_shares()["hub"]
+        )
+        np.testing.assert_array_equal(
+            found.strain.sel(owner="slew"), modes.strain_energy_shares()["slew"]
+        )

@@ -35,7 +35,7 @@ def test_no_mode_of_many_spans_is_missed(count: int, below: int) -> None:
     """Below beta = 6.5, where the determinant of transfer matrices changes its sign thousands of
     times: 2 n - 1, as many as finite elements and the exact dynamic stiffness count."""
     linear = mstmm.compile(spans(count), engine="looped").linearize(disturbances=())
-    assert Counting(linear.pencil).below(6.5**4) == below
+    assert Counting(linear.operators).below(6.5**4) == below
     if count <= 16:
         assert np.count_nonzero(linear.modes().omega < 6.5**2) == below
 
@@ -76,7 +76,7 @@ def test_a_frame_with_a_corner() -> None:
         ],
     )  # fmt: skip
     model = mstmm.compile(scene, engine="looped")
-    modes, counted = model.modes(4), model.exact_modes(len(exact))
+    modes, counted = model.modes(4), model.dynamic_stiffness_modes(len(exact))
     assert len(exact) >= 4
     np.testing.assert_allclose(modes.omega, exact[:4], rtol=2e-6)
     np.testing.assert_allclose(counted.omega, exact, rtol=1e-10)

@@ -61,5 +61,5 @@ def test_slow_motions_are_not_taken_for_free_ones(root: str) -> None:
     hide; what floats has three motions of frequency zero, not more."""
     free = 0 if root == "pin" else 3
     modes = rods(root).modes(free + 4)
-    assert modes.complete and not modes.omega[:free].any()
+    assert modes.is_complete and not modes.omega[:free].any()
     np.testing.assert_allclose(modes.omega[free:], np.sqrt(squares(root == "pin", 4)), rtol=1e-8)

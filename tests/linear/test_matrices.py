@@ -35,7 +35,7 @@ def test_matrices_are_those_of_the_differentiated_accelerations(name: str) -> No
     """Which the fused kernel gives: another route through the same equations."""
     model = example(name)
     linear = moving(model)
-    state, free = linear.state, list(linear.free)
+    state, free = linear.state, list(linear.free_speed_indices)
     other = model.derivatives(state.q, state.u)
     ours = np.linalg.solve(linear.M, np.hstack([linear.K, linear.C]))
     by_speed, rates = other.u[np.ix_(free, free)], other.rate_q[np.ix_(free, free)]
@@ -56,9 +56,10 @@ def test_stiffness_is_the_slope_of_the_efforts(name: str) -> None:
     columns = []
     for unit in np.eye(len(linear)):
         ahead, behind = (
-            model.inverse_dynamics(linear.displaced(x * unit), still, still) for x in (1e-5, -1e-5)
+            model.inverse_dynamics(linear.displaced_state(x * unit), still, still)
+            for x in (1e-5, -1e-5)
         )
-        columns.append((ahead - behind)[list(linear.free)] / 2e-5)
+        columns.append((ahead - behind)[list(linear.free_speed_indices)] / 2e-5)
     stiffness = np.array(columns).T
     np.testing.assert_allclose(linear.K, stiffness, atol=1e-7 * np.abs(stiffness).max())
     assert np.abs(model.inverse_dynamics(q, still, still)).max() < 1e-6 * np.abs(stiffness).max()
@@ -69,18 +70,18 @@ def test_parts_add_up(name: str) -> None:
     linear = moving(example(name))
     total = sum(getattr(linear, part) for part in PARTS)
     np.testing.assert_allclose(total, linear.K, atol=1e-12 * np.abs(linear.K).max())
-    np.testing.assert_allclose(linear.damping + linear.gyroscopic, linear.C, atol=1e-12)
+    np.testing.assert_allclose(linear.C_damping + linear.C_gyroscopic, linear.C, atol=1e-12)
 
 
 @pytest.mark.parametrize(("angle", "sign"), [(0.0, 1.0), (np.pi, -1.0)])
 def test_a_pendulum_hangs_or_stands(angle: float, sign: float) -> None:
     law = {"stiffness": 3.0, "rest": angle, "damping": 0.4}
     linear = mstmm.compile(pendulum(angle, law=law)).linearize([angle])
-    assert linear.coordinates == ("pivot.angle",) and linear.units == ("rad",)
+    assert linear.coordinate_names == ("pivot.angle",) and linear.coordinate_units == ("rad",)
     assert pytest.approx(0.03 + 2 * 0.25) == linear.M
-    assert linear.elastic == pytest.approx(3.0) and linear.damping == pytest.approx(0.4)
-    assert linear.geometric == pytest.approx(sign * 2 * 9.81 * 0.5)
-    assert not linear.load.any() and not linear.gyroscopic.any()
+    assert linear.K_elastic == pytest.approx(3.0) and linear.C_damping == pytest.approx(0.4)
+    assert linear.K_geometric == pytest.approx(sign * 2 * 9.81 * 0.5)
+    assert not linear.K_load.any() and not linear.C_gyroscopic.any()
 
 
 def test_a_string_under_tension_holds_across() -> None:
@@ -94,11 +95,14 @@ def test_a_string_under_tension_holds_across() -> None:
                 for side, x in (("left", -1.0), ("right", 1.0))],
     )  # fmt: skip
     linear = mstmm.compile(scene).linearize(np.zeros(3))
-    along, across = linear.coordinates.index("plane.x"), linear.coordinates.index("plane.y")
-    assert linear.elastic[along, along] == pytest.approx(100.0)
-    assert linear.geometric[along, along] == pytest.approx(0.0, abs=1e-12)
-    assert linear.geometric[across, across] == pytest.approx(2 * 50 * 0.4 / 1.0)
-    assert linear.elastic[across, across] == pytest.approx(0.0, abs=1e-12)
+    along, across = (
+        linear.coordinate_names.index("plane.x"),
+        linear.coordinate_names.index("plane.y"),
+    )
+    assert linear.K_elastic[along, along] == pytest.approx(100.0)
+    assert linear.K_geometric[along, along] == pytest.approx(0.0, abs=1e-12)
+    assert linear.K_geometric[across, across] == pytest.approx(2 * 50 * 0.4 / 1.0)
+    assert linear.K_elastic[across, across] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_load_that_follows_is_no_potential() -> None:
@@ -112,8 +116,8 @@ def test_a_load_that_follows_is_no_potential() -> None:
         ).linearize([0.0])
         for axes in ("inertial", "body")
     )  # fmt: skip
-    assert not dead.load.any() and dead.geometric[0, 0] == pytest.approx(9.81 - 7.0)
-    assert follows.load[0, 0] == pytest.approx(7.0) and follows.K[0, 0] == pytest.approx(9.81)
+    assert not dead.K_load.any() and dead.K_geometric[0, 0] == pytest.approx(9.81 - 7.0)
+    assert follows.K_load[0, 0] == pytest.approx(7.0) and follows.K[0, 0] == pytest.approx(9.81)
 
 
 @pytest.mark.parametrize(("load", "stable"), [(2.467, True), (2.469, False)])
@@ -128,7 +132,7 @@ def test_a_column_buckles_where_euler_has_it(load: float, stable: bool) -> None:
 def test_a_column_flutters_where_beck_has_it(load: float, stable: bool) -> None:
     """At 20.05 E I/L^2 (Beck, ZAMP 3 (1952) 225-228), without any other equilibrium."""
     linear = mstmm.compile(column(load, "body", 10)).linearize()
-    assert np.abs(linear.load - linear.load.T).max() > 1.0
+    assert np.abs(linear.K_load - linear.K_load.T).max() > 1.0
     assert (linear.modes().eigenvalues.real.max() <= 0) == stable
 
 
@@ -142,7 +146,7 @@ def test_a_rotating_beam_stiffens(spin: int) -> None:
     """Across the plane of rotation as published; within it omega^2 is less by the spin's square."""
     linear = mstmm.compile(rotor_blade(spin)).linearize()
     assert linear.state.u[0] == spin and not linear.warnings
-    across = [k for k, name in enumerate(linear.coordinates) if ".z" in name]
+    across = [k for k, name in enumerate(linear.coordinate_names) if ".z" in name]
     omega = linear.modes().omega
     flap = np.sqrt(np.linalg.eigvals(np.linalg.solve(linear.M, linear.K)[np.ix_(across, across)]))
     np.testing.assert_allclose(np.sort(flap.real)[:2], FLAP[spin], rtol=1e-4)
@@ -160,7 +164,7 @@ def test_a_blade_on_a_hub(spin: float, hub: float, apart: float) -> None:
     linear = mstmm.compile(rotor_blade(spin, hub, 12)).linearize()
     for plane, lag in ((".z", False), (".y", True)):
         expected = rotating(hub, spin, lag, 2)
-        here = [k for k, name in enumerate(linear.coordinates) if plane in name]
+        here = [k for k, name in enumerate(linear.coordinate_names) if plane in name]
         squares = eigvalsh(linear.K[np.ix_(here, here)], linear.M[np.ix_(here, here)])
         np.testing.assert_allclose(np.sqrt(squares[:2]), expected, rtol=apart)
 
@@ -186,12 +190,12 @@ def test_pushes_and_the_ground() -> None:
     linear = mstmm.compile(pendulum()).linearize(
         [angle], inputs=["pivot.effort", "bob.tip.force.x", "bob.tip.fy", "bob.tip.mz"]
     )
-    assert linear.inputs == (
+    assert linear.input_names == (
         "pivot.effort", "bob.tip.force.x", "bob.tip.force.y", "bob.tip.moment.z"
     )  # fmt: skip
     np.testing.assert_allclose(linear.V, [[1, np.cos(angle), np.sin(angle), 1]], atol=1e-14)
     # In the ground's axes the mass feels -m a.
-    assert linear.disturbances == tuple(f"ground.acceleration.{axis}" for axis in "xyz")
+    assert linear.disturbance_names == tuple(f"ground.acceleration.{axis}" for axis in "xyz")
     expected = -2 * 0.5 * np.array([[np.cos(angle), np.sin(angle), 0]])
     np.testing.assert_allclose(linear.W, expected, atol=1e-14)
     np.testing.assert_allclose(linear.B[1], linear.V[0] / 0.53)
@@ -203,7 +207,9 @@ def test_pushes_on_flexible_bodies() -> None:
     model = example("flexible_arm")
     linear = model.linearize(inputs=["lower.tip.force.y"], disturbances=["ground.acceleration.y"])
     run = [
-        model.simulate(1e-9, initial=(linear.displaced(x), np.zeros(model.nu)), output_times=[0.0])
+        model.simulate(
+            1e-9, initial=(linear.displaced_state(x), np.zeros(model.nu)), output_times=[0.0]
+        )
         for x in (1e-6 * np.eye(len(linear)))
     ]
     start = model.simulate(
@@ -219,8 +225,10 @@ def test_a_linear_model_foretells_small_motions() -> None:
     assert not linear.warnings
     x = 1e-4 * np.random.default_rng(3).standard_normal(len(linear))
     times = np.linspace(0, 0.3, 7)
-    run = model.simulate(0.3, initial=(linear.displaced(x), linear.state.u), output_times=times,
-                         rtol=1e-11, atol=1e-14)  # fmt: skip
+    run = model.simulate(
+        0.3, initial=(linear.displaced_state(x), linear.state.u), output_times=times, rtol=1e-11,
+        atol=1e-14,
+    )  # fmt: skip
     values, vectors = np.linalg.eig(linear.A)
     parts = np.linalg.solve(vectors, np.concatenate([x, 0 * x]))
     for t, q in zip(times, run.q, strict=True):

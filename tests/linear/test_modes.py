@@ -30,7 +30,7 @@ def test_masses_in_a_row(count: int) -> None:
     j = np.arange(1, 1 + min(count, 10))
     expected = 2 * np.sqrt(200 / 0.5) * np.sin((2 * j - 1) * np.pi / (4 * count + 2))
     np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
-    assert modes.complete and modes.undamped and not modes.damping.any()
+    assert modes.is_complete and modes.is_undamped and not modes.damping_ratio.any()
     np.testing.assert_allclose(modes.frequency * 2 * np.pi, modes.omega)
 
 
@@ -42,7 +42,7 @@ def test_beads_on_a_string(count: int) -> None:
     zeros = eigvalsh_tridiagonal(2.0 * np.arange(count) + 1, np.arange(1.0, count))
     expected = np.sqrt(9.81 / 0.2 * zeros[: len(modes)])
     np.testing.assert_allclose(modes.omega, expected, rtol=1e-8)
-    assert modes.complete
+    assert modes.is_complete
 
 
 def test_few_of_many_are_those_of_the_matrices() -> None:
@@ -51,7 +51,7 @@ def test_few_of_many_are_those_of_the_matrices() -> None:
     np.testing.assert_allclose(few.omega, every.omega[:12], rtol=1e-9)
     signs = np.sign(np.sum(few.shapes * every.shapes[:, :12], axis=0))
     np.testing.assert_allclose(few.shapes * signs, every.shapes[:, :12], atol=1e-6)
-    np.testing.assert_allclose(few.effective_mass, every.effective_mass[:12], atol=1e-8)
+    np.testing.assert_allclose(few.effective_modal_mass, every.effective_modal_mass[:12], atol=1e-8)
 
 
 def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,7 +61,7 @@ def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lanczos_iteration, "_VECTORS", 1)
     monkeypatch.setattr(lanczos_iteration, "_ROOM", 14)
     modes = linear.modes(10)
-    assert modes.complete
+    assert modes.is_complete
     np.testing.assert_allclose(modes.omega, expected.omega, rtol=1e-9)
     units = np.einsum("ik,ij,jl->kl", modes.shapes, linear.M, modes.shapes)
     np.testing.assert_allclose(units, np.eye(10), atol=1e-9)
@@ -75,7 +75,7 @@ def test_none_is_missed_of_ten_thousand() -> None:
     the square of their number in a wave; and the count agrees."""
     modes = of(hanging(10_000)).modes(20)
     np.testing.assert_allclose(modes.omega, jn_zeros(0, 20) / 2 * np.sqrt(9.81), rtol=7e-5)
-    assert modes.complete
+    assert modes.is_complete
 
 
 def test_equal_frequencies_are_all_found() -> None:
@@ -90,7 +90,7 @@ def test_equal_frequencies_are_all_found() -> None:
     modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=chains)).modes(7)
     j = np.repeat(np.arange(1, 4), 3)[:7]
     np.testing.assert_allclose(modes.omega, 20 * np.sin((2 * j - 1) * np.pi / 602), rtol=1e-8)
-    assert modes.complete
+    assert modes.is_complete
 
 
 def tied(count: int, stiffness: float) -> mstmm.Scene:
@@ -117,7 +117,7 @@ def test_springs_between_bodies_are_counted(stiffness: float) -> None:
     linear = of(tied(12, stiffness)).linearize(disturbances=())
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(linear.M, linear.K)).real)
     edges = [squares[0] - 1, *(squares[1:] + squares[:-1]) / 2, 1.1 * squares[-1]]
-    counting = Counting(linear.pencil)
+    counting = Counting(linear.operators)
     assert [counting.below(edge) for edge in edges] == list(range(len(squares) + 1))
 
 
@@ -135,7 +135,7 @@ def test_few_of_many_with_springs_between_are_complete() -> None:
     steps = np.eye(410) - np.eye(410, k=-1)
     squares = np.linalg.eigvalsh(200 * steps.T @ steps + 50 * pulls.T @ pulls) / 0.5
     np.testing.assert_allclose(modes.omega, np.sqrt(squares[:8]), rtol=1e-8)
-    assert modes.complete
+    assert modes.is_complete
 
 
 def test_loads_that_follow_other_bodies_are_not_counted() -> None:
@@ -143,7 +143,7 @@ def test_loads_that_follow_other_bodies_are_not_counted() -> None:
     scene = tied(6, 40.0).model_dump(by_alias=True, exclude_defaults=True)
     load = {"on": "b2", "force": ["3*h3.q", 0, 0]}
     linear = of(mstmm.Scene(**(scene | {"load": [load]}))).linearize(disturbances=())
-    assert Counting(linear.pencil).below(10.0) is None
+    assert Counting(linear.operators).below(10.0) is None
 
 
 #: Frequencies of a beam of length and mass per length 1 that hangs on a pin under 9.81 m/s2, by
@@ -155,17 +155,19 @@ HANGING = {1.0: (3.81917, 18.09284, 52.48919), 0.05: (3.77647, 9.72380, 19.13301
 def test_a_beam_that_hangs(stiffness: float) -> None:
     modes = of(hanging_beam(stiffness)).modes(3)
     np.testing.assert_allclose(modes.omega, HANGING[stiffness], rtol=3e-6)
-    assert modes.complete
+    assert modes.is_complete
 
 
 def test_a_free_body_has_motions_of_frequency_zero() -> None:
     model = mstmm.compile(mstmm.load_scene(EXAMPLES / "satellite_panels" / "scene.toml"))
     linear = model.linearize()
     modes = linear.modes()
-    assert not modes.omega[:6].any() and modes.omega[6] > 1 and not modes.growing.any()
+    assert not modes.omega[:6].any() and modes.omega[6] > 1 and not modes.unstable.any()
     assert any("nothing pushes back space.vx_increment" in text for text in linear.warnings)
-    np.testing.assert_allclose(modes.effective_mass.sum(axis=0), 136.0)  # both panels and the hub
-    strain = modes.strain()
+    np.testing.assert_allclose(
+        modes.effective_modal_mass.sum(axis=0), 136.0
+    )  # both panels and the hub
+    strain = modes.strain_energy_shares()
     assert np.isnan(strain["space"][:6]).all()
     np.testing.assert_allclose(strain["east"][6:] + strain["west"][6:], 1.0)
 
@@ -182,7 +184,7 @@ def test_many_bodies_that_float_have_motions_of_frequency_zero() -> None:
     )  # fmt: skip
     linear = of(scene).linearize(disturbances=())
     few, every = linear.modes(9), linear.modes()
-    assert few.complete and not few.omega[:6].any() and not few.growing.any()
+    assert few.is_complete and not few.omega[:6].any() and not few.unstable.any()
     np.testing.assert_allclose(few.omega[6:], every.omega[6:9], rtol=1e-6)
 
 
@@ -190,7 +192,7 @@ def test_effective_masses_add_up() -> None:
     modes = of(hanging(30)).modes()
     linear = modes.linear
     rigid = linear.W[:, 0] @ np.linalg.solve(linear.M, linear.W[:, 0])
-    assert modes.effective_mass[:, 0].sum() == pytest.approx(rigid) and rigid < 1.0
+    assert modes.effective_modal_mass[:, 0].sum() == pytest.approx(rigid) and rigid < 1.0
 
 
 @pytest.mark.parametrize(("damping", "ratio"), [(0.5, 0.25), (2.0, 1.0), (4.0, 2.0)])
@@ -203,8 +205,10 @@ def test_damping_in_parts_of_the_critical_one(damping: float, ratio: float) -> N
     kept = expected[expected.imag >= 0]
     np.testing.assert_allclose(np.sort(modes.eigenvalues), np.sort(kept), atol=3e-8)
     if ratio < 1:
-        assert modes.damping[0] == pytest.approx(ratio) and modes.omega[0] == pytest.approx(1.0)
-    assert of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(damped=False).undamped
+        assert modes.damping_ratio[0] == pytest.approx(ratio) and modes.omega[0] == pytest.approx(
+            1.0
+        )
+    assert of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(damped=False).is_undamped
 
 
 def test_damped_motions_of_many() -> None:
@@ -214,14 +218,14 @@ def test_damped_motions_of_many() -> None:
     modes = of(mstmm.Scene(gravity=(0, 0, 0), chain=[chain])).modes(6)
     omega = 40 * np.sin((2 * np.arange(1, 7) - 1) * np.pi / 2002)
     np.testing.assert_allclose(modes.omega, omega, rtol=1e-8)
-    np.testing.assert_allclose(modes.damping, omega * 0.02 / 200 / 2, rtol=1e-6)
-    assert modes.complete is None
+    np.testing.assert_allclose(modes.damping_ratio, omega * 0.02 / 200 / 2, rtol=1e-6)
+    assert modes.is_complete is None
 
 
 def test_shapes_are_states() -> None:
     model = of(hanging(3))
     modes = model.modes()
-    moved = modes.displaced(0, 0.1)
+    moved = modes.displaced_state(0, 0.1)
     np.testing.assert_allclose(moved, 0.1 * modes.shapes[:, 0])
     run = model.simulate(2 * np.pi / modes.omega[0], initial=(1e-4 * moved, np.zeros(3)))
     np.testing.assert_allclose(run.q[-1], 1e-4 * moved, atol=1e-9)  # there again a period later
@@ -231,7 +235,7 @@ def test_a_pendulum_that_stands_is_unstable_and_linear_all_the_same() -> None:
     linear = of(pendulum()).linearize([np.pi])
     (text,) = linear.warnings
     assert "unstable: a motion of pivot.angle grows with 4.302 1/s" in text
-    assert linear.modes().growing.all() and linear.modes().eigenvalues[0] > 0
+    assert linear.modes().unstable.all() and linear.modes().eigenvalues[0] > 0
 
 
 def test_states_that_do_not_last_are_told() -> None:
@@ -257,7 +261,7 @@ def test_what_makes_no_sense() -> None:
             linear.modes(wrong)  # type: ignore[arg-type]
     for k in (1, -1, True, "a"):
         with pytest.raises(SceneError, match="counted from 0"):
-            linear.modes().moving(k)  # type: ignore[arg-type]
+            linear.modes().dominant_coordinates(k)  # type: ignore[arg-type]
     with pytest.raises(SceneError, match=r'"pivot.efort".*did you mean "?pivot.effort'):
         model.linearize(inputs=["pivot.efort"])
     with pytest.raises(SceneError, match=r"bob\.tip\.force\.w"):
@@ -289,14 +293,14 @@ def test_scenes_in_which_nothing_moves_or_rests(recwarn: pytest.WarningsRecorder
 
     for still in (scene(type="fixed"), scene(type="pin", drive="sin(t)")):
         assert len(still.modes()) == 0 and not still.linearize().warnings
-        assert still.frequency_response([1.0]).values.shape == (1, 0, 3)
+        assert still.frequency_response([1.0]).response.shape == (1, 0, 3)
         assert repr(still.modes()) == "<Modes: none>"
         with pytest.raises(SceneError, match="nothing moves"):
             still.modes(1)
         with pytest.raises(SceneError, match="nothing moves"):
-            still.locus("block.mass", [1.0, 2.0])
+            still.root_locus("block.mass", [1.0, 2.0])
         with pytest.raises(SceneError, match="nothing moves"):
-            still.critical("block.mass", 1.0, 2.0)
+            still.stability_limit("block.mass", 1.0, 2.0)
         with pytest.raises(SceneError, match="nothing to draw"):
             still.frequency_response([1.0]).plot()
     with pytest.raises(NumericalFailure, match=r"no equilibrium|undetermined"):
@@ -308,7 +312,10 @@ def test_the_names_of_a_ball() -> None:
     linear = mstmm.compile(mstmm.load_scene(EXAMPLES / "heavy_top" / "scene.toml")).linearize(
         [1, 0, 0, 0]
     )
-    assert linear.coordinates[0] == "point.wx_increment" and linear.units == ("rad",) * 3
+    assert (
+        linear.coordinate_names[0] == "point.wx_increment"
+        and linear.coordinate_units == ("rad",) * 3
+    )
 
 
 def test_a_buckled_column_is_found_where_its_frequency_vanishes() -> None:
@@ -333,8 +340,8 @@ def test_metres_and_radians_are_compared_by_sizes() -> None:
     )  # fmt: skip
     modes = mstmm.compile(scene, engine="looped").modes()
     assert abs(modes.shapes[1, 0] / modes.shapes[0, 0]) == pytest.approx(11.35, rel=1e-2)
-    assert modes.moving(0) == ["rail.displacement", "pin.angle"]
-    assert modes.moving(1) == ["pin.angle"]
+    assert modes.dominant_coordinates(0) == ["rail.displacement", "pin.angle"]
+    assert modes.dominant_coordinates(1) == ["pin.angle"]
 
 
 def test_findings_about_inputs_and_outputs_are_none_of_the_motions() -> None:

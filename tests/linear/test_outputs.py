@@ -39,17 +39,20 @@ def arm(**more: Any) -> mstmm.Model:
 
 def test_inputs_and_outputs_of_the_scene_are_the_defaults() -> None:
     linear = arm().linearize()
-    assert linear.inputs == ("motor", "wind")
-    assert arm().linearize(inputs=[]).inputs == ()
+    assert linear.input_names == ("motor", "wind")
+    assert arm().linearize(inputs=[]).input_names == ()
     answer = linear.frequency_response([1.0, 7.0])
-    assert answer.inputs == linear.inputs and answer.input_units == ("N*m", "N")
-    assert answer.outputs == ("swing", "tip.x", "tip.y", "tip.z", "reach", "mixed", "rated")
+    assert answer.input_names == linear.input_names and answer.input_units == ("N*m", "N")
+    assert answer.output_names == ("swing", "tip.x", "tip.y", "tip.z", "reach", "mixed", "rated")
     assert answer.output_units == ("deg", "m", "m", "m", "", "", "")
     named = linear.frequency_response([1.0, 7.0], outputs=["pivot.angle", "tip.y"])
-    assert named.output_units == ("rad", "m") and named.outputs == ("pivot.angle", "tip.y")
-    np.testing.assert_allclose(answer.values[:, 0], np.rad2deg(named.values[:, 0].real)
-                               + 1j * np.rad2deg(named.values[:, 0].imag), rtol=1e-13)  # fmt: skip
-    np.testing.assert_array_equal(answer.values[:, 2], named.values[:, 1])
+    assert named.output_units == ("rad", "m") and named.output_names == ("pivot.angle", "tip.y")
+    np.testing.assert_allclose(
+        answer.response[:, 0],
+        np.rad2deg(named.response[:, 0].real) + 1j * np.rad2deg(named.response[:, 0].imag),
+        rtol=1e-13,
+    )
+    np.testing.assert_array_equal(answer.response[:, 2], named.response[:, 1])
     assert linear.output_matrices()[0].shape == (7, 4)
 
 
@@ -76,7 +79,7 @@ def test_expressions_follow_by_the_chain_rule() -> None:
         step = np.eye(4)[k]
         found = differences(lambda e, s=step: values(model, q + e * s[:2], u + e * s[2:]))
         np.testing.assert_allclose(c[:, k], found, rtol=1e-6, atol=1e-7)
-    for k, name in enumerate(linear.inputs):
+    for k, name in enumerate(linear.input_names):
         value = {"motor": 0.7, "wind": 0.0}[name]
         found = differences(
             lambda e, n=name, v=value: values(model.with_inputs({n: v + e}), q, u), 1e-3
@@ -88,7 +91,7 @@ def test_expressions_follow_by_the_chain_rule() -> None:
 def test_the_sweep_gives_them_as_the_state_space_does() -> None:
     linear = arm().linearize()
     omega = np.array([0.4, 3.0, 21.0])
-    found = linear.frequency_response(omega).values
+    found = linear.frequency_response(omega).response
     c, d = linear.output_matrices()
     for w, ours in zip(omega, found, strict=True):
         dense = c @ np.linalg.solve(1j * w * np.eye(4) - linear.A, linear.B) + d
@@ -119,7 +122,7 @@ def test_speeds_of_a_ball_that_turns() -> None:
 def test_what_linear_models_do_not_have_is_left_out_and_told() -> None:
     more = [{"name": "stored", "of": "energy"}, {"name": "swing", "of": "pivot.angle"}]
     linear = arm(output=more).linearize()
-    assert linear.frequency_response([1.0]).outputs == ("swing",)
+    assert linear.frequency_response([1.0]).output_names == ("swing",)
     assert any("output stored is not among the outputs" in text for text in linear.warnings)
     with pytest.raises(SceneError, match='output "stored": of: "energy": expected'):
         linear.frequency_response([1.0], outputs=["stored"])
@@ -144,4 +147,4 @@ def test_an_input_that_drives_is_no_default() -> None:
            "law": {"effort": "motor"}}  # fmt: skip
     given = [{"name": "road", "rates": [0, 0]}, {"name": "motor"}]
     scene = mstmm.Scene(gravity=(0, -9.81, 0), body=[body, bob], hinge=[slide, pin], input=given)
-    assert mstmm.compile(scene).linearize().inputs == ("motor",)
+    assert mstmm.compile(scene).linearize().input_names == ("motor",)

@@ -31,8 +31,8 @@ def test_pictures(response: FrequencyResponse, tmp_path: Path) -> None:
     np.testing.assert_allclose(y, response.magnitude[:, 1, 0])
     assert above.get_legend().get_texts()[0].get_text() == "pin.angle / pin.effort, rad/(N*m)"
     assert below.get_xlabel() == "frequency in Hz"
-    plane = response.nyquist(tmp_path / "nyquist.svg").axes[0]
-    np.testing.assert_allclose(plane.lines[0].get_xdata(), response.values[:, 0, 0].real)
+    plane = response.plot_nyquist(tmp_path / "nyquist.svg").axes[0]
+    np.testing.assert_allclose(plane.lines[0].get_xdata(), response.response[:, 0, 0].real)
     assert {p.name for p in tmp_path.iterdir()} == {"bode.png", "nyquist.svg"}
     with pytest.raises(SceneError, match=r"expected a name ending in \.png, \.svg, \.pdf"):
         response.plot(tmp_path / "bode.txt")
@@ -56,7 +56,7 @@ def test_a_waterfall_is_a_row_of_answers(tmp_path: Path) -> None:
     found = model.waterfall("pivot.law.stiffness[0]", stiffness, OMEGA, *names)
     k = np.array(stiffness)[:, None] + 9.81
     expected = 1 / (k + 0.3j * OMEGA - 0.53 * OMEGA**2)
-    np.testing.assert_allclose(found.values, expected, rtol=1e-9)
+    np.testing.assert_allclose(found.response, expected, rtol=1e-9)
     with pytest.raises(SceneError, match=r"output = \['pivot.angle'\]: expected one name"):
         model.waterfall("pivot.law.stiffness[0]", stiffness, OMEGA, names[0], [names[1]])  # type: ignore[arg-type]
     mixed = model.waterfall("pivot.law.stiffness[0]", [4.0, 9.0, 1.0], OMEGA, *names)
@@ -67,7 +67,7 @@ def test_a_waterfall_is_a_row_of_answers(tmp_path: Path) -> None:
     numbers = np.array(rows[1:], float).reshape(3, 60, 5)
     np.testing.assert_array_equal(numbers[:, 0, 0], stiffness)
     np.testing.assert_allclose(
-        numbers[:, :, 3] * np.exp(1j * numbers[:, :, 4]), found.values, rtol=1e-12
+        numbers[:, :, 3] * np.exp(1j * numbers[:, :, 4]), found.response, rtol=1e-12
     )
     with pytest.raises(SceneError, match="expected a path"):
         found.save(None)  # type: ignore[arg-type]

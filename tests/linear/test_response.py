@@ -37,8 +37,8 @@ def at(scene: Scene, q: Array, t: float = 0.3) -> Linear:
 def check_dense(linear: Linear) -> None:
     """Amplitudes under accelerations of the ground, by the sweep and by matrices."""
     found = linear.frequency_response(OMEGA)
-    assert found.outputs == linear.coordinates
-    for omega, values in zip(OMEGA, found.values, strict=True):
+    assert found.output_names == linear.coordinate_names
+    for omega, values in zip(OMEGA, found.response, strict=True):
         z = linear.K + 1j * omega * linear.C - omega**2 * linear.M
         expected = np.linalg.solve(z, linear.W)
         size = np.abs(expected).max()
@@ -89,7 +89,7 @@ def test_a_frequency_costs_a_fixed_share_a_body() -> None:
     kept, called = [], []
     for count in (50, 2000):
         linear = compiled(chain(count)).linearize(np.zeros(count), disturbances=())
-        outputs = [linear.coordinates[-1]]
+        outputs = [linear.coordinate_names[-1]]
 
         def asked(points: int, linear: Linear = linear, outputs: list[str] = outputs) -> int:
             omega = np.linspace(1, 2, points)
@@ -143,12 +143,12 @@ def test_an_oscillator_with_its_rates_and_ends() -> None:
     )
     assert found.output_units == ("m", "m/s", "m/s2", "m", "m/s", "m/s2", "m")
     assert found.input_units == ("N", "N", "m/s2")
-    for row, w in zip(found.values, omega, strict=True):
+    for row, w in zip(found.response, omega, strict=True):
         x = 1 / (k + 1j * w * d - w**2 * m)
         v, a = 1j * w * x, -(w**2) * x
         expected = np.outer([x, v, a, x, v, a, 0], [1, 1, -m])
         np.testing.assert_allclose(row, expected, rtol=1e-13, atol=1e-300)
-    np.testing.assert_array_equal(found.magnitude, np.abs(found.values))
+    np.testing.assert_array_equal(found.magnitude, np.abs(found.response))
     assert found.phase[-1, 0, 0] < -3.1  # far above the resonance it moves against the push
 
 
@@ -160,7 +160,7 @@ def test_ends_go_along_with_coordinates() -> None:
              "axis": [0, 0, 1], "law": {"stiffness": 9.0, "damping": 0.1}}  # fmt: skip
     model = compiled({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
     outputs = ["pin.angle", "rod.tip.x", "rod.tip.vy", "rod.wz", "rod.alphaz"]
-    found = model.frequency_response([1.5], ["rod.tip.mz"], outputs, q=[0.4]).values[0, :, 0]
+    found = model.frequency_response([1.5], ["rod.tip.mz"], outputs, q=[0.4]).response[0, :, 0]
     angle = 1 / (9.0 + 0.15j - 1.5**2 * 2.0)
     expected = [1, -2 * np.sin(0.4), 1.5j * 2 * np.cos(0.4), 1.5j, -(1.5**2)]
     np.testing.assert_allclose(found, angle * np.array(expected), rtol=1e-13)
@@ -172,11 +172,11 @@ def test_an_absorber_at_its_own_frequency(omega: float) -> None:
     model = compiled(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0), (0.5, 20.0, 0.0)))
     beside = [3.0, omega, 11.0, 4.0, 7.0]
     linear = model.linearize(inputs=["s0.effort"])
-    for w, found in zip(beside, linear.frequency_response(beside).values[:, :, 0], strict=True):
+    for w, found in zip(beside, linear.frequency_response(beside).response[:, :, 0], strict=True):
         expected = np.linalg.solve(linear.K - w**2 * linear.M, np.eye(3)[0])
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-13)
     two = compiled(masses((3.0, 70.0, 0.0), (1.0, 100.0, 0.0)))
-    first, apart = two.frequency_response([omega], ["s0.effort"]).values[0, :, 0]
+    first, apart = two.frequency_response([omega], ["s0.effort"]).response[0, :, 0]
     assert abs(first) < 1e-9
     assert abs(first + apart - -0.01) < 1e-9  # x2 = -F / k2
 
@@ -191,7 +191,7 @@ def test_a_response_that_is_zero_is_an_answer(output: str, turned: float) -> Non
     scene["output"] = [{"name": "twice", "of": "2*s0.displacement"}]
     omega = float(np.sqrt(50 / 3))
     linear = compiled(scene).linearize(inputs=["s0.effort"])
-    found = linear.frequency_response([omega], outputs=[output]).values[0, 0, 0]
+    found = linear.frequency_response([omega], outputs=[output]).response[0, 0, 0]
     assert abs(found) < 1e-12  # m, m/s, m/s2 a N
 
 
@@ -209,7 +209,7 @@ def test_equal_masses_beside_each_other_do_not_move_apart() -> None:
     scene["output"] = [{"name": "apart", "of": "ls0.displacement - rs0.displacement"}]
     omega = float(np.sqrt(50 / 3))
     found = compiled(scene).frequency_response([omega, 3.0], ["ground.acceleration.x"], ["apart"])
-    assert np.abs(found.values).max() < 1e-12
+    assert np.abs(found.response).max() < 1e-12
 
 
 @pytest.mark.parametrize("output", ["s0.displacement", "s1.displacement", "m1.ax"])
@@ -225,7 +225,7 @@ def test_a_long_run_under_a_sine() -> None:
     scene = chain(3, damping=4.0)
     linear = compiled(scene).linearize(np.zeros(3), inputs=["rope[1].tip.fx"])
     outputs = ["rope[2].tip.x", "rope[0].tip.vx"]
-    found = linear.frequency_response([omega], outputs=outputs).values[0, :, 0]
+    found = linear.frequency_response([omega], outputs=outputs).response[0, :, 0]
     load = {"on": "rope[1].tip", "force": [f"{push}*sin({omega}*t)", 0, 0]}
     times = 200.0 + np.linspace(0, 2 * np.pi / omega, 41)
     run = compiled({**scene, "load": [load]}).simulate(

@@ -26,8 +26,8 @@ def test_a_spinning_blade() -> None:
     scene["hinge"][0]["drive"] = "spin*t"
     scene["constants"] = {"spin": 0.0}
     model = mstmm.compile(mstmm.Scene.from_data(scene), engine="looped")
-    locus = model.locus("constants.spin", [0.0, 3.0, 6.0], 4)
-    assert locus.eigenvalues.shape == (3, 4) and not locus.growth.any()
+    locus = model.root_locus("constants.spin", [0.0, 3.0, 6.0], 4)
+    assert locus.eigenvalues.shape == (3, 4) and not locus.growth_rate.any()
     flap = [k for k in range(4) if abs(2 * np.pi * locus.frequency[2, k] - 7.3604) < 1e-3]
     assert 2 * np.pi * locus.frequency[0, flap[0]] == pytest.approx(3.5160, rel=1e-4)
 
@@ -42,7 +42,7 @@ def test_motions_go_on_through_a_crossing(tmp_path: Path) -> None:
     both["hinge"][1]["outboard"] = "bob2"
     model = mstmm.compile(mstmm.Scene.from_data(both), engine="looped")
     values = np.linspace(1.0, 7.0, 7)
-    locus = model.locus("pivot.law.stiffness[0]", values)
+    locus = model.root_locus("pivot.law.stiffness[0]", values)
     omega = np.sort(2 * np.pi * locus.frequency, axis=0)
     inertia, weight = 0.53, 9.81
     changed = np.sqrt((values + weight) / inertia)
@@ -74,19 +74,19 @@ def test_where_a_column_buckles_and_flutters() -> None:
         scene["load"][0]["force"] = ["0 - p", 0, 0]
         scene["constants"] = {"p": 1.0}
         model = mstmm.compile(mstmm.Scene.from_data(scene), engine="looped")
-        found = model.critical("constants.p", *ends)
+        found = model.stability_limit("constants.p", *ends)
         assert found.value == pytest.approx(expected, rel=4e-4)
-        assert found.kind == kind and found.moving[0] == "column.y1"
+        assert found.kind == kind and found.dominant_coordinates[0] == "column.y1"
         assert (found.frequency > 1) == (kind == "flutter")
 
 
 def test_ends_that_are_none() -> None:
     model = mstmm.compile(pendulum(law={"stiffness": 1.0}), engine="looped")
     with pytest.raises(SceneError, match="no motion grows there"):
-        model.critical("pivot.law.stiffness[0]", 1.0, 2.0)
+        model.stability_limit("pivot.law.stiffness[0]", 1.0, 2.0)
     with pytest.raises(SceneError, match="did you mean"):
-        model.locus("pivot.law.stifness[0]", [1.0])
+        model.root_locus("pivot.law.stifness[0]", [1.0])
     with pytest.raises(SceneError, match="values"):
-        model.locus("pivot.law.stiffness[0]", [])
+        model.root_locus("pivot.law.stiffness[0]", [])
     with pytest.raises(SceneError, match="values"):
-        model.locus("pivot.law.stiffness[0]", [1.0, float("nan")])
+        model.root_locus("pivot.law.stiffness[0]", [1.0, float("nan")])

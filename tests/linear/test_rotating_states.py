@@ -32,7 +32,7 @@ def test_a_moment_on_a_body_that_spins() -> None:
     below = A * B * s**2 - (C - B) * (A - C) * SPIN**2
     wx, wy = B * s / below, (C - A) * SPIN / below
     expected = np.array([wx, wy, (s * wx + SPIN * wy) / (s**2 + SPIN**2)]).T
-    np.testing.assert_allclose(found.values[:, :, 0], expected, rtol=1e-9)
+    np.testing.assert_allclose(found.response[:, :, 0], expected, rtol=1e-9)
 
 
 def test_what_goes_round_is_refused() -> None:

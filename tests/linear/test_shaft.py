@@ -42,7 +42,7 @@ def test_a_round_shaft_whirls_forward_and_backward(spin: float) -> None:
     modes = shaft((1.0, 1.0)).with_parameters({"constants.spin": spin}).modes()
     expected = np.sort(np.concatenate([FREE + spin, np.abs(FREE - spin)]))
     np.testing.assert_allclose(np.sort(modes.omega), expected, rtol=1e-7)
-    assert not modes.growing.any()
+    assert not modes.unstable.any()
 
 
 @pytest.mark.parametrize("spin", [1.0, 3.2, 3.9, 4.5, 20.5])
@@ -58,14 +58,14 @@ def test_a_shaft_that_is_not_round(spin: float) -> None:
     grown = max(expected.real)
     assert modes.eigenvalues.real.max() == pytest.approx(grown, rel=1e-6, abs=1e-6)
     inside = any(f * 0.9 < spin < f * 1.2 for f in FREE)
-    assert (grown > 1e-3) == inside == bool(modes.growing.any())
+    assert (grown > 1e-3) == inside == bool(modes.unstable.any())
 
 
 def test_the_onset_along_the_spin() -> None:
     """Found where the softer plane's frequency is met, and left where the stiffer one's is."""
     model = shaft((1.44, 0.81))
     for stable, unstable, place in ((2.0, 3.5, 0.9), (4.4, 3.5, 1.2)):
-        found = model.critical("constants.spin", stable, unstable)
+        found = model.stability_limit("constants.spin", stable, unstable)
         assert found.value == pytest.approx(place * FREE[0], rel=1e-6)
-    locus = model.locus("constants.spin", np.linspace(0.1, 2.0, 5), 2)
+    locus = model.root_locus("constants.spin", np.linspace(0.1, 2.0, 5), 2)
     assert locus.eigenvalues.shape == (5, 2)

@@ -70,7 +70,7 @@ def test_eigenvalues_in_their_plane(tmp_path: Path) -> None:
     axis = modes.plot_eigenvalues(tmp_path / "map.svg").axes[0]
     still, growing = (np.column_stack(line.get_data()) for line in axis.lines[:2])
     assert len(growing) == 1 and growing[0, 0] > 0
-    values = modes.eigenvalues[~modes.growing]
+    values = modes.eigenvalues[~modes.unstable]
     np.testing.assert_array_equal(still, np.column_stack([values.real, values.imag]))
     assert (tmp_path / "map.svg").stat().st_size > 5_000
 

@@ -53,7 +53,7 @@ def test_the_column_of_an_effort_is_how_the_length_goes() -> None:
     law."""
     model = crane()
     linear = model.linearize(inputs=["strut.effort", "motor"])
-    assert linear.inputs == ("strut.effort", "motor") and linear.controls[0].unit == "N"
+    assert linear.input_names == ("strut.effort", "motor") and linear.input_channels[0].unit == "N"
     c, d = linear.output_matrices(["strut.length", "strut.length_rate", "strut.effort"])
     np.testing.assert_allclose(linear.V[:, 0], linear.V[:, 1], atol=1e-13)
     np.testing.assert_allclose(linear.V[:, 0], c[0, :2], atol=1e-13)
@@ -78,9 +78,9 @@ def test_outputs_of_springs_in_the_scene() -> None:
                {"name": "push", "of": "strut.effort"}]  # fmt: skip
     model = crane(output=outputs)
     answer = model.frequency_response([2.0, 9.0])
-    assert answer.outputs == ("stroke", "push") and answer.output_units == ("mm", "N")
+    assert answer.output_names == ("stroke", "push") and answer.output_units == ("mm", "N")
     plain = model.frequency_response([2.0, 9.0], outputs=["strut.length"])
-    np.testing.assert_allclose(answer.values[:, :1], 1000 * plain.values, rtol=1e-12)
+    np.testing.assert_allclose(answer.response[:, :1], 1000 * plain.response, rtol=1e-12)
     run = model.simulate(0.1)
     np.testing.assert_array_equal(run.quantity("push").values, run.quantity("strut.effort").values)
 

@@ -64,9 +64,9 @@ def test_a_pendulum_reads_as_in_books() -> None:
     assert sp.ImmutableMatrix([[-m * g * c]]) == found.K
     assert sp.ImmutableMatrix([[1, sp.Rational(7, 10)]]) == found.V
     assert sp.ImmutableMatrix([[-m * c, 0, 0]]) == found.W
-    assert found.coordinates == ("pin1.angle",)
-    assert found.inputs == ("pin1.effort", "rod1.tip.force.x")
-    assert found.numbers == {m: 2.5, g: -9.81, c: 0.3}
+    assert found.coordinate_names == ("pin1.angle",)
+    assert found.input_names == ("pin1.effort", "rod1.tip.force.x")
+    assert found.symbol_values == {m: 2.5, g: -9.81, c: 0.3}
 
 
 def test_a_double_pendulum_against_lagrange() -> None:
@@ -170,7 +170,7 @@ def test_a_spatial_arm_at_other_values(
     found = linear.symbolic(keep)
     assert list(found.symbols) == keep
     for name in MATRICES:
-        assert apart(getattr(found, name).subs(found.numbers), getattr(linear, name)) < 1e-12
+        assert apart(getattr(found, name).subs(found.symbol_values), getattr(linear, name)) < 1e-12
     known = model.parameters
     for _ in range(2):
         values = {
@@ -212,7 +212,7 @@ def test_coordinates_along_a_drive_stay_numbers() -> None:
     found = linear.symbolic(["lower.mass", "elbow.angle"])
     assert found.M.shape == (1, 1)
     for angle in (0.3, -0.7):
-        at = {**found.numbers, found.symbols["elbow.angle"]: angle}
+        at = {**found.symbol_values, found.symbols["elbow.angle"]: angle}
         state = replace(linear.state, q=np.array([0.4, angle]))
         moved = replace(linear, state=state)
         assert apart(found.K.subs(at), moved.K) < 1e-12
@@ -253,7 +253,9 @@ def test_inputs_of_the_scene_push(t: float) -> None:
     )
     found = linear.symbolic(["rod.mass", "rod.ends.tip.position[0]", "tie.law.stiffness"])
     for factor in (1.0, 1.2):
-        values = {name: factor * found.numbers[symbol] for name, symbol in found.symbols.items()}
+        values = {
+            name: factor * found.symbol_values[symbol] for name, symbol in found.symbols.items()
+        }
         check_numbers(linear, found, values)
     assert found.V[0, 2] == found.W[0, 0] == found.symbols["rod.ends.tip.position[0]"]
 

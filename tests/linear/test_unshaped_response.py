@@ -33,7 +33,7 @@ def test_a_response_across_the_plane_of_the_shapes_is_an_objection(
     hinge: str, inputs: list[str], outputs: list[str], omega: float
 ) -> None:
     lacking = mstmm.compile(bar({"y": 2}, hinge)).frequency_response([omega], inputs, outputs)
-    assert [risk.name for risk in lacking.risks if risk.doubt] == ["shapes"]
+    assert [risk.name for risk in lacking.risks if risk.invalidates] == ["shapes"]
     assert not lacking.trusted
     assert "add z = 2 to its modes" in lacking.warnings[0]
     assert (
@@ -49,9 +49,9 @@ def test_the_static_compliance_is_missed_and_found_with_shapes() -> None:
         mstmm.compile(bar(modes)).frequency_response([1e-3], ["bar.tip.fz"], ["bar.tip.z"])
         for modes in ({"y": 2}, {"y": 2, "z": 4})
     ]
-    assert abs(found[0].values[0, 0, 0]) < 1e-15
+    assert abs(found[0].response[0, 0, 0]) < 1e-15
     assert not found[0].trusted
-    assert np.abs(found[1].values[0, 0, 0]) == pytest.approx(1 / (3 * EI), rel=0.01)
+    assert np.abs(found[1].response[0, 0, 0]) == pytest.approx(1 / (3 * EI), rel=0.01)
     assert found[1].trusted
 
 

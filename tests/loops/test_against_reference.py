@@ -26,9 +26,9 @@ ROUNDING, MOST = 1e-14, 5e-12
 
 def smallest_pivot(model: mstmm.Model, q: Any) -> float:
     """In parts of the mobility of its row; 1 where nothing closes."""
-    if not model.loops.cut:
+    if not model.loops.cut_hinges:
         return 1.0
-    calls = LoopCalls(LoopedEngine(model.packed), q)
+    calls = LoopCalls(LoopedEngine(model.packed_scene), q)
     calls.correction(calls.slip, q, np.zeros(model.nu))
     return float((calls.pivots() / calls.mobility).min())
 
@@ -41,7 +41,7 @@ def test_random_mechanisms(seed: int) -> None:
     model = mstmm.compile(mstmm.Scene(**copy.deepcopy(scene)))
     allowed = min(ROUNDING / smallest_pivot(model, q), MOST)
     assert worst(model.accelerations(q, u), found.udot) < allowed
-    assert not model.loops.redundant
+    assert not model.loops.redundant_rows
     result = model.simulate(t_end=0.0, initial=(q, u))
     assert result.success, result.message
     names = [hinge["name"] for hinge in scene["hinge"]]

@@ -32,7 +32,7 @@ def ways_of_four_bar(found: Array) -> Array:
 @pytest.mark.parametrize("cut", planar.NAMES)
 def test_mass_matrix_of_a_four_bar(cut: str) -> None:
     model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=OBLIQUE))
-    assert model.loops.independent == ("foot.angle_rate",)
+    assert model.loops.independent_speeds == ("foot.angle_rate",)
     found, rates = planar.start(0.9, SPEED)
     along = ways_of_four_bar(found)
     mass = along @ planar.matrix_and_load(found, rates, LAWS)[0] @ along
@@ -45,7 +45,9 @@ def test_random_mechanisms(seed: int) -> None:
     efforts that give the accelerations for which they were asked."""
     scene, q, u = random_mechanism(seed)
     model, tree = compiled(scene), read(scene)
-    places = [model.layout.u_names.index(name) for name in model.loops.independent]
+    places = [
+        model.coordinate_layout.u_names.index(name) for name in model.loops.independent_speeds
+    ]
     ways = scipy.linalg.null_space(torn(tree, q), rcond=1e-10)
     assert ways.shape[1] == len(places) == model.loops.mobility
     ways = ways @ np.linalg.inv(ways[places])
@@ -94,7 +96,7 @@ def test_legs_carry_a_platform() -> None:
     middle = result.position("platform")[0]
     wrench = np.hstack([along, np.cross(heads - middle, along)]).T
     forces = np.linalg.solve(wrench, [0, 0, 20 * 9.81, 0, 0, 0])
-    places = [model.layout.hinges[name].u for name in slides]
+    places = [model.coordinate_layout.hinges[name].u for name in slides]
     assert worst(efforts[places], forces) < 1e-7
 
 
@@ -119,7 +121,9 @@ def test_columns_of_efforts() -> None:
     q, _ = model.initial_state()
     columns = np.random.default_rng(1).standard_normal((model.nu, 3))
     found = model.solve(q, columns)
-    places = [model.layout.u_names.index(name) for name in model.loops.independent]
+    places = [
+        model.coordinate_layout.u_names.index(name) for name in model.loops.independent_speeds
+    ]
     twice = model.solve(q, np.eye(model.nu)[:, places])
     assert worst(np.linalg.inv(twice[places]), model.mass_matrix(q)) < 1e-11
     assert worst(found, model.solve(q, np.eye(model.nu)) @ columns) < 1e-11

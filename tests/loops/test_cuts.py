@@ -43,7 +43,7 @@ def signs(cut: str) -> Array:
 def test_any_hinge_of_a_four_bar(cut: str, tilt: tuple[float, float, float]) -> None:
     """Springs, dampers, a motor, friction, rotors in all hinges; in the plane and across."""
     model = compiled(four_bar(speed=SPEED, cut=cut, laws=LAWS, tilt=tilt))
-    assert model.loops.cut == (cut,)
+    assert model.loops.cut_hinges == (cut,)
     found, rates = planar.start(0.9, SPEED)
     q, u = model.initial_state()
     assert worst(signs(cut) * q, planar.HINGES @ found) < 1e-12
@@ -102,7 +102,7 @@ def test_any_hinge_of_a_bricard_ring() -> None:
     pins = np.arange(6)
     for cut in range(6):
         model = compiled(bricard(cut))
-        assert model.loops.cut == (f"pin{cut}",)
+        assert model.loops.cut_hinges == (f"pin{cut}",)
         udot = model.accelerations(*model.initial_state())
         turned_round = (pins > cut) | (pins == 5)
         signs = (-1.0) ** (pins + turned_round)
@@ -120,10 +120,10 @@ def test_any_leg_carries_the_platform() -> None:
             if hinge["type"] == "ball":
                 hinge["cut"] = hinge["name"] != f"head{first}"
         model = compiled(scene)
-        assert set(model.loops.cut) == {f"head{k}" for k in range(6) if k != first}
+        assert set(model.loops.cut_hinges) == {f"head{k}" for k in range(6) if k != first}
         assert (model.loops.rank, model.loops.mobility) == (15, 6)
         udot = model.accelerations(*model.initial_state())
-        slides = [udot[model.layout.hinges[f"slide{k}"].u] for k in range(6)]
+        slides = [udot[model.coordinate_layout.hinges[f"slide{k}"].u] for k in range(6)]
         found.append([*model.simulate(0.0).acceleration("platform")[0], *slides])
     assert np.abs(found[0]).max() > 1.0
     assert worst(found[1], found[0]) < 1e-11

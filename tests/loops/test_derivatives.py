@@ -87,7 +87,7 @@ def test_by_rotors() -> None:
     for hinge in scene["hinge"]:
         del hinge["cut"]
     model = compiled(scene)
-    (chosen,) = model.loops.cut
+    (chosen,) = model.loops.cut_hinges
     with pytest.raises(mstmm.errors.SceneError, match=f'cut hinge "{chosen}" is zero'):
         model.derivatives(q, u, parameters=[f"{chosen}.law.inertia[0]"])
 
@@ -96,8 +96,8 @@ def test_those_of_linear_models() -> None:
     """At rest, along the independent motion: -M^-1 K and -M^-1 C."""
     model = compiled(four_bar(laws=SPRINGS, tilt=OBLIQUE))
     linear = model.linearize()
-    assert linear.mechanism is not None
-    along, places = linear.mechanism.ways, list(linear.free)
+    assert linear.constrained_motion is not None
+    along, places = linear.constrained_motion.ways, list(linear.free_speed_indices)
     found = model.derivatives(linear.state.q, linear.state.u)
     both = np.hstack([(found.q @ along)[places], (found.u @ along)[places]])
     assert worst(both, linear.A[1:]) < 1e-10

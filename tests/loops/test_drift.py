@@ -24,7 +24,7 @@ def test_a_four_bar_stays_closed() -> None:
         assert result.success, result.message
         for row in (7, 20):
             assert gap(model, scene, result.q[row], result.u[row]) < 1e-12
-        energy = result.energies()["kinetic"]
+        energy = result.energy_components()["kinetic"]
         drift[step] = float(abs(energy[-1] / energy[0] - 1)) / end
     assert abs(result.q[-1, 0]) > 100 * np.pi
     assert drift[5e-4] < 1e-9
@@ -49,11 +49,11 @@ def test_a_bricard_ring_stays_closed() -> None:
     energy = result.energy()
     assert np.abs(energy - energy[0]).max() < 1e-5
     certificate = result.certificate
-    assert certificate.closure is not None
-    assert certificate.closure.gap < 1e-12 and certificate.closure.slip < 1e-11
+    assert certificate.loop_closure is not None
+    assert certificate.loop_closure.gap < 1e-12 and certificate.loop_closure.slip < 1e-11
     assert "loads left open: " in str(certificate)
     opened = replace(result.trajectory, q=result.q + 1e-3 * np.eye(1, result.q.shape[1]))
-    seen = Result(result.model, opened).certificate.closure
+    seen = Result(result.model, opened).certificate.loop_closure
     assert seen is not None and seen.gap > 1e-4
 
 

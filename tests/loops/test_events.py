@@ -16,7 +16,7 @@ def test_an_event_of_a_cut_hinge(engine: str) -> None:
     event = {"name": "up", "when": "tip.q > 2", "do": "stop"}
     scene = mstmm.Scene(**four_bar(speed=6.0), event=[event])
     model = mstmm.compile(scene, engine=engine)
-    place = model.layout.hinges["tip"].q
+    place = model.coordinate_layout.hinges["tip"].q
     long, short = (model.simulate(4.0, rtol=rtol, atol=1e-9) for rtol in (1e-4, 1e-9))
     for run in (long, short):
         assert run.message.startswith('stopped by event "up"')

@@ -49,8 +49,8 @@ def test_all_of_them_close_loops(what: str, method: str) -> None:
     run = model.simulate(t_end, method, rtol=RTOL, atol=1e-2 * RTOL, output_times=times)
     assert run.success, run.message
     assert np.abs(run.q - wanted.q).max() < 300 * RTOL
-    assert run.certificate.closure is not None
-    assert run.certificate.closure.gap < 1e-12 and run.certificate.closure.slip < 1e-12
+    assert run.certificate.loop_closure is not None
+    assert run.certificate.loop_closure.gap < 1e-12 and run.certificate.loop_closure.slip < 1e-12
 
 
 @pytest.mark.parametrize("method", ["scipy-LSODA", "sundials-Adams"])
@@ -60,7 +60,7 @@ def test_what_keeps_its_history_begins_anew(method: str) -> None:
     wanted = model.simulate(times[-1], rtol=1e-10, output_times=times)
     run = model.simulate(times[-1], method, rtol=1e-6, output_times=times)
     assert run.success, run.message
-    assert abs(run.coordinate("shaft")[-1] - wanted.coordinate("shaft")[-1]) < 0.05
+    assert abs(run.coordinates("shaft")[-1] - wanted.coordinates("shaft")[-1]) < 0.05
 
 
 def test_the_same_method_errs_alike() -> None:

@@ -73,7 +73,7 @@ def test_cutting_another_hinge_changes_nothing() -> None:
     found = []
     for cut in CUTS:
         one = model(linkage(cut))
-        assert one.loops.cut == (cut,)
+        assert one.loops.cut_hinges == (cut,)
         q, u = one.initial_state()
         result = one.simulate(3.0, rtol=1e-10, atol=1e-12, output_times=[0.0, 1.5, 3.0])
         assert result.success, result.message
@@ -130,7 +130,7 @@ def test_energy_is_kept_and_the_loop_stays_closed() -> None:
     assert abs(result.q[-1, 0]) > 4 * np.pi
     for q in result.q:
         for name, wanted in zip(PINS[1:], angles(q[0])[1:], strict=True):
-            found = q[one.layout.hinges[name].q]
+            found = q[one.coordinate_layout.hinges[name].q]
             assert abs(np.remainder(found - wanted + np.pi, 2 * np.pi) - np.pi) < 1e-11
 
 
@@ -179,7 +179,7 @@ def test_a_hinge_that_lets_go(kind: str, cut: str) -> None:
     result = one.simulate(0.7, rtol=1e-10, atol=1e-12, output_times=[0.0, 0.2, 0.7])
     assert result.success, result.message
     assert np.abs(result.q[1] - result.q[0]).max() < 1e-9
-    closure = result.certificate.closure
+    closure = result.certificate.loop_closure
     assert closure is not None and closure.gap < 1e-12 and closure.slip < 1e-11
     if kind == "pin":
         free = linkage(cut, laws=False)
@@ -194,7 +194,7 @@ def test_a_free_hinge_closes_nothing() -> None:
     scene = linkage(None, laws=False)
     scene["hinge"][3] |= {"type": "free", "cut": True, "initial": {}}
     one = model(scene)
-    assert (one.loops.rank, one.loops.rows, one.loops.mobility) == (0, (), 3)
+    assert (one.loops.rank, one.loops.constraint_rows, one.loops.mobility) == (0, (), 3)
     result = one.simulate(0.6, output_times=[0.0, 0.6])
     tree = linkage(None, laws=False)
     del tree["hinge"][3]

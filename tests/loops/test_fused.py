@@ -59,13 +59,13 @@ def compiled(scene: Scene, engine: str = "looped") -> mstmm.Model:
 
 def interpreted(model: mstmm.Model, q: Any, u: Any) -> dict[str, Any]:
     """Everything that the fused IR gives of a state, with plain floats."""
-    packed = model.packed
+    packed = model.packed_scene
     structure, p = structure_of(packed.system, model.known or {}, floors=packed.floors)
     inputs = {
         "p": list(p), "t": [TIME], "q": list(q), "u": list(u), "efforts": [0.0] * model.nu,
         "memory": list(model.looped.start_memory()[: structure.n_memory]),
     }  # fmt: skip
-    kernels = model.fusion.fused(structure).kernels.values()
+    kernels = model.fusion.structure_ir(structure).kernels.values()
     return {name: x for kernel in kernels for name, x in evaluate_floats(kernel, inputs).items()}
 
 
@@ -147,7 +147,7 @@ def test_runs_sessions_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> Non
     batch = fused.simulate_batch(
         (np.tile(q, (3, 1)), np.tile(u, (3, 1))), t_end=0.2, method="rk4", step=2e-3
     )
-    alone = looped.packed.system.chosen  # rows that go by what a run remembers
+    alone = looped.packed_scene.system.chosen  # rows that go by what a run remembers
     assert ("one after the other" if alone else "side by side") in batch.engine
     assert batch.success.all()
     assert np.abs(batch.q[:, -1] - wanted.q[-1]).max() < 1e-12
@@ -193,10 +193,10 @@ def test_rows_that_nothing_moves_cost_nothing(scene: str) -> None:
     one = linkage("closing_pin", laws=False) if scene == "four-bar" else four_bars(2)
     model = compiled(one)
     every = structure_of(pack(model.scene, None).system, {}, floors=[1e-9] * 20)[0]
-    left = structure_of(model.packed.system, {}, floors=model.packed.floors)[0]
+    left = structure_of(model.packed_scene.system, {}, floors=model.packed_scene.floors)[0]
     assert (len(every.rows), len(left.rows)) == ((5, 2) if scene == "four-bar" else (10, 4))
     counts = [
-        {name: kernel.flops() for name, kernel in model.fusion.fused(one).kernels.items()}
+        {name: kernel.flops() for name, kernel in model.fusion.structure_ir(one).kernels.items()}
         for one in (every, left)
     ]
     assert counts[0] == counts[1]
@@ -206,5 +206,5 @@ def test_wide_loops_stay_looped() -> None:
     """Five rows pass every link of Bricard's ring."""
     model = compiled(bricard())
     for most, wanted in ((9, ""), (8, "like 9 bodies")):
-        assert wanted in Fusion(model.packed, {}, {}, most=most).obstacle
-        assert bool(wanted) == bool(Fusion(model.packed, {}, {}, most=most).obstacle)
+        assert wanted in Fusion(model.packed_scene, {}, {}, most=most).obstacle
+        assert bool(wanted) == bool(Fusion(model.packed_scene, {}, {}, most=most).obstacle)

@@ -82,7 +82,7 @@ def exact(q: Array, u: Array, masses: list[float]) -> Array:
 def test_a_heavy_rod_between_light_ones(power: int, refines: int, accuracy: float) -> None:
     masses = [1.0, 1.0, 1.0, 10.0**power, 1.0, 1.0]
     model = mstmm.compile(mstmm.Scene(**chain(masses)))
-    assert model.packed.model.refines == refines
+    assert model.packed_scene.model.refines == refines
     q, u = model.initial_state()
     with mpmath.workdps(40):
         wanted = exact(q, u, masses)

@@ -64,8 +64,8 @@ def test_accelerations_are_those_in_space(count: int, base: str) -> None:
     states = [(q + 0.1 * draw.standard_normal(model.nq), draw.standard_normal(model.nu))
               for _ in range(5)]  # fmt: skip
     flat = [model.accelerations(*state) for state in states]
-    assert model.packed.model.flat
-    model.packed.model.flat = model.packed.ffi.NULL
+    assert model.packed_scene.model.flat
+    model.packed_scene.model.flat = model.packed_scene.ffi.NULL
     for state, found in zip(states, flat, strict=True):
         assert found == pytest.approx(model.accelerations(*state), rel=1e-11, abs=1e-11)
 
@@ -92,7 +92,7 @@ def test_the_plane_may_lie_anywhere(axis: list[float]) -> None:
     rotation = Rotation.align_vectors([axis], [z])[0].as_matrix()
     models = [mstmm.compile(mstmm.Scene(**scene), engine="looped")
               for scene in (lying, turned(upright, rotation))]  # fmt: skip
-    assert all(model.packed.model.flat for model in models)
+    assert all(model.packed_scene.model.flat for model in models)
     found, expected = (model.accelerations(*model.initial_state()) for model in models)
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
@@ -104,10 +104,10 @@ def test_what_acts_in_inertial_axes_keeps_others_in_space() -> None:
     load = {"on": "coupler0.coupler", "force": [1.0, 2.0, 3.0]}
     for more, in_a_plane in (({}, True), ({"load": [load]}, False)):
         model = mstmm.compile(mstmm.Scene(**(lying | more)), engine="looped")
-        assert bool(model.packed.model.flat) == in_a_plane
+        assert bool(model.packed_scene.model.flat) == in_a_plane
 
 
 def test_a_ring_in_space_is_swept_there() -> None:
     """Its axes are those of a cube."""
     model = mstmm.compile(mstmm.Scene(**bricard()), engine="looped")
-    assert not model.packed.model.flat
+    assert not model.packed_scene.model.flat

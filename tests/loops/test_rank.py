@@ -45,13 +45,13 @@ def test_pins_of_a_plane_in_space(count: int, rows: int) -> None:
     """Of five rows a pin of a planar loop has two of its own, in any plane."""
     for scene in (four_bars(count, 1.1), oblique(four_bars(count, 1.1))):
         loops = loops_of(scene)
-        assert len(loops.rows) == rows
+        assert len(loops.constraint_rows) == rows
         assert loops.rank == 2 * count
-        assert len(loops.redundant) == 3 * count
-        assert {word for _, word in loops.redundant} == {"z", "mx", "my"}
-        assert loops.mobility == 1 and not loops.singular and loops.width <= 4
-        assert len(loops.not_unique) == 3 * count + 1
-        assert set(loops.not_unique.values()) == {("fz", "mx", "my")}
+        assert len(loops.redundant_rows) == 3 * count
+        assert {word for _, word in loops.redundant_rows} == {"z", "mx", "my"}
+        assert loops.mobility == 1 and not loops.singular and loops.max_open_rows <= 4
+        assert len(loops.indeterminate_reactions) == 3 * count + 1
+        assert set(loops.indeterminate_reactions.values()) == {("fz", "mx", "my")}
 
 
 def test_an_oblique_plane_changes_no_motion() -> None:
@@ -67,10 +67,10 @@ def test_a_ball_cut_leaves_one_row_too_many() -> None:
     scene["hinge"][3]["type"] = "ball"
     scene["hinge"][3].pop("initial")
     loops = loops_of(scene)
-    assert (len(loops.rows), loops.rank) == (3, 2)
-    assert loops.redundant == (("closing_pin", "z"),)
+    assert (len(loops.constraint_rows), loops.rank) == (3, 2)
+    assert loops.redundant_rows == (("closing_pin", "z"),)
     # One state: a force across the plane at the ball, which the bars carry to the ground.
-    assert loops.not_unique == {
+    assert loops.indeterminate_reactions == {
         "crank_pin": ("fz", "mx", "my"), "coupler_pin": ("fz", "my"), "rocker_pin": ("fz", "my"),
         "closing_pin": ("fz",),
     }  # fmt: skip
@@ -88,10 +88,14 @@ def test_a_third_crank_repeats_a_row_of_its_own() -> None:
          "initial": {"q": 1.1, "u": -1.0}},
     ]  # fmt: skip
     loops = loops_of(scene)
-    assert (len(loops.rows), loops.rank, loops.mobility) == (10, 3, 1)
+    assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (10, 3, 1)
     assert not loops.singular
     # Along its own crank, besides what the plane leaves open.
-    assert loops.not_unique["foot"] == loops.not_unique["foot0"] == ("fx", "fz", "mx", "my")
+    assert (
+        loops.indeterminate_reactions["foot"]
+        == loops.indeterminate_reactions["foot0"]
+        == ("fx", "fz", "mx", "my")
+    )
 
 
 @pytest.mark.parametrize(("tilt", "told"), [(1e-7, False), (1e-5, True), (9e-4, True)])
@@ -100,13 +104,13 @@ def test_rows_that_nearly_repeat_others_are_told(tilt: float, told: bool) -> Non
     scene = linkage("closing_pin", laws=False)
     scene["hinge"][2]["axis"] = [np.sin(tilt), 0.0, np.cos(tilt)]
     model = mstmm.compile(mstmm.Scene(**scene))
-    gap, name, direction = model.loops.misfit
+    gap, name, direction = model.loops.redundancy_gap
     assert gap == pytest.approx(tilt * told, rel=0.2)
     assert (name, direction) == (("closing_pin", "mx") if told else ("", ""))
     result = model.simulate(0.01)
     assert [risk.name for risk in result.risks] == ["nearly-redundant"] * told
     assert all(
-        "closing_pin" in risk.element and f"{gap:.1e}" in risk.means for risk in result.risks
+        "closing_pin" in risk.element and f"{gap:.1e}" in risk.description for risk in result.risks
     )
 
 
@@ -123,8 +127,8 @@ def test_loads_of_couplings_that_repeat_each_other_are_open() -> None:
     bodies = [rod(name) for name in "abc"]
     scene = {"gravity": [0, -9.81, 0], "body": bodies, "hinge": hinges, "coupling": couplings}
     loops = loops_of(scene)
-    assert loops.redundant == (("again", "expression"),) and not loops.momentary
-    assert loops.not_unique == {"gear": ("expression",), "again": ("expression",)}
+    assert loops.redundant_rows == (("again", "expression"),) and not loops.redundant_in_this_pose
+    assert loops.indeterminate_reactions == {"gear": ("expression",), "again": ("expression",)}
 
 
 def test_loads_of_constraints_that_repeat_each_other_are_open() -> None:
@@ -148,13 +152,17 @@ def test_loads_of_constraints_that_repeat_each_other_are_open() -> None:
     scene = {"gravity": [0, -9.81, 0], "body": rods, "hinge": hinges, "constraint": distances}
     loops = loops_of(scene)
     assert (loops.rank, loops.mobility) == (1, 1)
-    assert loops.not_unique["to_tip"] == loops.not_unique["to_middle"] == ("length",)
-    assert set(loops.not_unique) == {"foot_a", "foot_b", "to_tip", "to_middle"}
+    assert (
+        loops.indeterminate_reactions["to_tip"]
+        == loops.indeterminate_reactions["to_middle"]
+        == ("length",)
+    )
+    assert set(loops.indeterminate_reactions) == {"foot_a", "foot_b", "to_tip", "to_middle"}
 
 
 def test_a_certificate_tells_rows_and_loads() -> None:
     model = mstmm.compile(mstmm.Scene(**linkage("closing_pin", laws=False)))
-    told = str(model.simulate(0.01).certificate.closure)
+    told = str(model.simulate(0.01).certificate.loop_closure)
     assert "2 of 5 rows count, 1 speed left; repeat others: z of closing_pin, mx" in told
     assert "loads left open: fz mx my of crank_pin" in told
 
@@ -164,11 +172,11 @@ def test_flat_windows_are_a_singular_start(count: int) -> None:
     """Flat on the ground a row of each loop says nothing; a little way off it does, so it stays."""
     model = mstmm.compile(mstmm.Scene(**four_bars(count, 0.0)))
     assert model.loops.singular
-    assert (model.loops.rank, model.loops.nearby) == (count, 2 * count)
-    assert model.loops.momentary == tuple((f"right{k}", "x") for k in range(count))
-    assert set(model.loops.momentary) < set(model.loops.redundant)
-    assert int(model.packed.model.n_rows) == 2 * count
-    assert set(model.loops.not_unique.values()) == {("fz", "mx", "my")}
+    assert (model.loops.rank, model.loops.generic_rank) == (count, 2 * count)
+    assert model.loops.redundant_in_this_pose == tuple((f"right{k}", "x") for k in range(count))
+    assert set(model.loops.redundant_in_this_pose) < set(model.loops.redundant_rows)
+    assert int(model.packed_scene.model.n_rows) == 2 * count
+    assert set(model.loops.indeterminate_reactions.values()) == {("fz", "mx", "my")}
     result = model.simulate(0.5, rtol=1e-8)
     assert result.success, result.message
 
@@ -176,8 +184,8 @@ def test_flat_windows_are_a_singular_start(count: int) -> None:
 def test_many_flat_windows_leave_the_same_open() -> None:
     """Off the pose a pin of a plane bears every load in it, however many windows there are."""
     loops = loops_of(four_bars(12, 0.0))
-    assert (loops.rank, loops.nearby) == (12, 24)
-    assert set(loops.not_unique.values()) == {("fz", "mx", "my")}
+    assert (loops.rank, loops.generic_rank) == (12, 24)
+    assert set(loops.indeterminate_reactions.values()) == {("fz", "mx", "my")}
 
 
 @pytest.mark.parametrize("angle", [0.0, np.pi])
@@ -185,8 +193,8 @@ def test_many_flat_windows_leave_the_same_open() -> None:
 def test_cranks_side_by_side_begin_flat(count: int, angle: float) -> None:
     """With one freedom left off the pose, `count` + 1 coordinates of the tree take `count` rows."""
     loops = loops_of(cranks(angle=angle, places=np.linspace(0.0, 1.5, count).tolist()))
-    assert (loops.rank, loops.nearby) == (count - 1, count)
-    assert len(loops.momentary) == 1
+    assert (loops.rank, loops.generic_rank) == (count - 1, count)
+    assert len(loops.redundant_in_this_pose) == 1
 
 
 def test_cranks_that_begin_flat_go_on_as_one() -> None:
@@ -212,8 +220,8 @@ def test_masses_do_not_decide() -> None:
 def test_what_hangs_on_a_loop_does_not_decide() -> None:
     """The loops at the foot of a scissor mast carry all that is above them."""
     loops = loops_of(scissors(120))
-    assert (len(loops.rows), loops.rank, loops.mobility) == (600, 240, 1)
-    assert not loops.singular and loops.width <= 4
+    assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (600, 240, 1)
+    assert not loops.singular and loops.max_open_rows <= 4
 
 
 def test_an_axis_a_little_off_does_not_lock() -> None:
@@ -227,9 +235,9 @@ def test_an_axis_a_little_off_does_not_lock() -> None:
 def test_rows_are_called_by_axes_of_their_own() -> None:
     """Five directions of a pin along no axis have five names; its load is open but about it."""
     loops = loops_of(bricard())
-    assert (loops.rank, len(set(loops.rows))) == (4, 5)
+    assert (loops.rank, len(set(loops.constraint_rows))) == (4, 5)
     about = {"pin0": "my", "pin1": "mz", "pin2": "mx", "pin3": "my", "pin4": "mz", "pin5": "mx"}
-    for name, words in loops.not_unique.items():
+    for name, words in loops.indeterminate_reactions.items():
         assert len(words) == 5 and about[name] not in words
 
 

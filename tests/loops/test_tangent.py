@@ -102,7 +102,7 @@ def test_a_step(case: tuple[mstmm.Model, float, float], apart: bool) -> None:
 
 def hinge_is_driven(model: mstmm.Model, speed: int) -> bool:
     """Whether a drive gives the speed."""
-    slots = model.layout.hinges
+    slots = model.coordinate_layout.hinges
     return any(
         hinge.drive is not None and slots[hinge.name].u == speed for hinge in model.scene.hinge
     )

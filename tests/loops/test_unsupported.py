@@ -99,7 +99,7 @@ def test_no_fused_code() -> None:
     scene["hinge"][0]["initial"].pop("u")
     held |= {"drive": f"{start!r}", "release": "t >= 0.2"}
     model = mstmm.compile(mstmm.Scene(**scene))
-    assert model.engine_choice.startswith('looped: hinge "closing_pin" is released')
+    assert model.engine_reason.startswith('looped: hinge "closing_pin" is released')
     with pytest.raises(mstmm.SceneError, match='no fused code: hinge "closing_pin" is released'):
         mstmm.compile(model.scene, engine="fused")
 

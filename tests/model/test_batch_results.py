@@ -53,18 +53,18 @@ def test_each_run_has_the_quantities_of_a_single_one(model: Model, batch: BatchR
             known, found = one.quantity(name), batch.quantity(name)
             assert (found.unit, found.labels) == (known.unit, known.labels)
             np.testing.assert_allclose(found.values[k], known.values, rtol=1e-6, atol=1e-6)
-    assert set(batch.names()) == set(one.names()) - {"work"}
+    assert set(batch.quantity_names()) == set(one.quantity_names()) - {"work"}
     with pytest.raises(mstmm.SceneError, match="batches do not integrate it"):
         batch.quantity("work")
     with pytest.raises(mstmm.SceneError, match='did you mean "energy"'):
         batch.quantity("enegry")
     for wrong in (-4, "0", 0.0, None):
         with pytest.raises(mstmm.SceneError, match="expected the number of one of 3 runs"):
-            batch.run(wrong)  # type: ignore[arg-type]
+            batch.result(wrong)  # type: ignore[arg-type]
     with pytest.raises(mstmm.SceneError, match="run = 3: expected the number of one of 3 runs"):
-        batch.run(3)
+        batch.result(3)
     with pytest.raises(mstmm.SceneError, match="no certificate"):
-        batch.run(1).certificate  # noqa: B018
+        batch.result(1).certificate  # noqa: B018
 
 
 def test_as_a_dataset_and_in_a_file(batch: BatchResult, tmp_path: Path) -> None:

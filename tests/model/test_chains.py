@@ -76,10 +76,10 @@ def compiled(data: Data) -> Model:
 
 def reordered(model: Model, plain: Model) -> tuple[list[int], list[int]]:
     """Places in q and u of the scene that is written out."""
-    q, u = plain.layout.q_names, plain.layout.u_names
+    q, u = plain.coordinate_layout.q_names, plain.coordinate_layout.u_names
     return (
-        [q.index(plain_name(name)) for name in model.layout.q_names],
-        [u.index(plain_name(name)) for name in model.layout.u_names],
+        [q.index(plain_name(name)) for name in model.coordinate_layout.q_names],
+        [u.index(plain_name(name)) for name in model.coordinate_layout.u_names],
     )
 
 
@@ -125,7 +125,7 @@ def test_drawn_chains_are_the_scenes_written_out(draw: int, rng: np.random.Gener
     data = drawn(np.random.default_rng([draw, int(rng.integers(2**31))]))
     model, plain = compiled(data), compiled(written_out(data))
     q, u = model.initial_state()
-    assert model.layout.q_names == [*map(member_name, plain.layout.q_names)]
+    assert model.coordinate_layout.q_names == [*map(member_name, plain.coordinate_layout.q_names)]
     q, u = q + 0.3 * rng.standard_normal(model.nq), u + rng.standard_normal(model.nu)
     assert np.array_equal(model.accelerations(q, u, 0.4), plain.accelerations(q, u, 0.4)), data
 
@@ -136,7 +136,7 @@ def member_name(name: str) -> str:
 
 
 def test_names_and_places_of_the_layout() -> None:
-    layout = compiled(branched()).layout
+    layout = compiled(branched()).coordinate_layout
     assert [layout.q_name(i) for i in range(layout.nq)] == layout.q_names
     assert [layout.u_name(i) for i in range(layout.nu)] == layout.u_names
     assert list(layout.hinges)[:2] == ["hook", "rope[0].hinge"]

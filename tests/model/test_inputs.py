@@ -187,7 +187,9 @@ def test_linear_models_are_those_of_the_numbers_that_inputs_are() -> None:
         for name in ("M", "C", "K", "load", "geometric", "elastic"):
             found, expected = getattr(linear, name), getattr(plain, name)
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
-    assert not still.packed.system.timed and moving.packed.system.timed
+    assert (
+        not still.packed_scene.system.has_timed_loads and moving.packed_scene.system.has_timed_loads
+    )
 
 
 @pytest.mark.parametrize("t", [0.0, 0.5])
@@ -207,7 +209,7 @@ def test_linear_models_are_pushed_by_inputs(t: float) -> None:
         slope = (missing(value - 1e-4) - missing(value + 1e-4)) / 2e-4
         np.testing.assert_allclose(linear.V[:, 0], slope, rtol=1e-8)
         np.testing.assert_allclose(linear.V[:, 1], 1.0, rtol=1e-14)
-        assert linear.inputs == ("motor", "pin.effort")
+        assert linear.input_names == ("motor", "pin.effort")
 
 
 def test_an_input_on_a_flexible_body_pushes_as_the_force_does() -> None:

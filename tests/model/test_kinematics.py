@@ -94,13 +94,13 @@ def test_energy_momentum_and_what_holds_against_gravity(_: int, rng: np.random.G
     scene, q, u = fresh(rng)
     model, tree = mstmm.compile(mstmm.Scene(**scene)), read(scene)
     energy = newton_euler.energy(scene, q, u)
-    parts = model.energies(q, u)
+    parts = model.energy_components(q, u)
     assert model.energy(q, u) == pytest.approx(energy, rel=1e-11, abs=1e-11)
     assert np.sum([*parts.values()]) == pytest.approx(energy, rel=1e-11, abs=1e-11)
     momenta = np.concatenate(newton_euler.momentum(scene, q, u))
     assert worst(model.momentum(q, u), momenta, 1.0) < 1e-11
     solved = newton_euler.solve(scene, q, u)
-    left = model.mass_matrix(q) @ solved.udot + model.bias(q, u)
+    left = model.mass_matrix(q) @ solved.udot + model.bias_efforts(q, u)
     assert np.abs(left).max(initial=0.0) < 1e-9 * max(1.0, np.abs(solved.udot).max(initial=0.0))
     units = [newton_euler.motion(scene, q, unit) for unit in np.eye(model.nu)]
     wanted = [-sum(body.mass * tree.gravity @ at.velocity(i, body.center)
@@ -143,7 +143,7 @@ def test_points_of_bent_bodies_move_as_in_a_run(rng: np.random.Generator) -> Non
         assert speed == pytest.approx(wanted, rel=1e-11, abs=1e-11)
         wanted = [*run.acceleration(name)[0], *run.angular_acceleration(name)[0]]
         assert change == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    rise = [model.energies(model.integrate(q, unit, way), np.zeros(model.nu))["gravity"]
+    rise = [model.energy_components(model.integrate(q, unit, way), np.zeros(model.nu))["gravity"]
             for unit in np.eye(model.nu) for way in (1e-5, -1e-5)]  # fmt: skip
     slopes = np.subtract(rise[::2], rise[1::2]) / 2e-5
     assert model.gravity_efforts(q) == pytest.approx(slopes, rel=1e-6, abs=1e-6)
@@ -163,10 +163,10 @@ def test_efforts_of_mechanisms_are_those_of_their_motions() -> None:
     bodies = [arm | {"name": name} for name in ("left", "rod", "right")]
     model = mstmm.compile(mstmm.Scene(gravity=[0, -10, 0], body=bodies, hinge=hinges))
     q, u = model.initial_state()
-    (independent,) = model.loops.independent
+    (independent,) = model.loops.independent_speeds
     sign = 1.0 if independent.startswith(("a", "c")) else -1.0
     assert model.gravity_efforts(q) == pytest.approx([sign * 20 * np.cos(0.5)], rel=1e-10)
-    assert model.bias(q, u) == pytest.approx(model.gravity_efforts(q), rel=1e-9)
+    assert model.bias_efforts(q, u) == pytest.approx(model.gravity_efforts(q), rel=1e-9)
 
 
 CALLS: dict[str, Callable[..., Any]] = {

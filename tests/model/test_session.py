@@ -139,7 +139,7 @@ def test_an_event_ends_a_session() -> None:
     with pytest.raises(SceneError, match='stopped by event "fell" at t = 0'):
         ticks(stepped, 0.05, 40)
     run = model.simulate(2.0, step=0.01)
-    assert stepped.t == run.t[-1] and "fell" in stepped.stopped
+    assert stepped.t == run.t[-1] and "fell" in stepped.stop_reason
     np.testing.assert_array_equal(stepped.q, run.q[-1])
 
 

@@ -123,7 +123,7 @@ def test_large_scenes_let_other_threads_run() -> None:
 
 def test_the_mass_matrix_gives_what_inverse_dynamics_asks() -> None:
     one, (q, _, _, asked) = model("looped"), state(2)
-    still, driven = np.zeros(one.nu), one.layout.hinges["four"]
+    still, driven = np.zeros(one.nu), one.coordinate_layout.hinges["four"]
     q[driven.q] = asked[driven.u] = 0.0  # where its drive has it
     apart = one.inverse_dynamics(q, still, asked) - one.inverse_dynamics(q, still, still)
     free = [k for k in range(one.nu) if k != driven.u]

@@ -63,8 +63,8 @@ def test_a_pendulum_is_as_near_to_its_closed_form_as_asked(angle: float) -> None
     model, told, kept = pendulums(1, angle), [], []
     for asked in np.geomspace(1e-2, 1e-9, 29).tolist():
         run = model.simulate(10.0, error=asked)
-        known = run.error_estimate
-        assert known is not None and known.met and known.estimate is not None
+        known = run.achieved_error
+        assert known is not None and known.is_met and known.estimate is not None
         assert known.estimate <= asked
         true = np.abs(run.q[:, 0] + math.pi / 2 - swing(run.t, angle)).max()
         told.append(true <= 10 * known.estimate)
@@ -74,8 +74,8 @@ def test_a_pendulum_is_as_near_to_its_closed_form_as_asked(angle: float) -> None
 
 def test_an_error_near_rounding_is_told() -> None:
     run = pendulums(1, 2.5).simulate(10.0, error=1e-10)
-    known = run.error_estimate
-    assert known is not None and known.met and known.estimate is not None
+    known = run.achieved_error
+    assert known is not None and known.is_met and known.estimate is not None
     true = np.abs(run.q[:, 0] + math.pi / 2 - swing(run.t, 2.5)).max()
     assert true <= 10 * known.estimate <= 1e-9
     assert run.trusted
@@ -91,8 +91,8 @@ def test_a_double_pendulum_against_another_integrator(asked: float) -> None:
         np.concatenate([q, u]), "DOP853", times, rtol=1e-12, atol=1e-13,
     )  # fmt: skip
     run = model.simulate(5.0, output_times=times, error=asked)
-    known = run.error_estimate
-    assert known is not None and known.met and known.estimate is not None
+    known = run.achieved_error
+    assert known is not None and known.is_met and known.estimate is not None
     true = np.abs(run.q - other.y[:2].T).max()
     assert true <= 10 * known.estimate <= 10 * asked
     np.testing.assert_array_equal(run.t, times)
@@ -117,10 +117,10 @@ def stiff(count: int, k: float, zeta: float) -> mstmm.Model:
 def test_stiff_motion_is_reached_by_an_implicit_method() -> None:
     model = stiff(4, 1e8, 1.0)
     run = model.simulate(1.0, error=1e-3, error_of="rod3.tip.position")
-    known = run.error_estimate
-    assert known is not None and known.met
+    known = run.achieved_error
+    assert known is not None and known.is_met
     assert known.method in ("rodas4p2", "rodas5p")
-    assert known.unit == "m" and known.of == "rod3.tip.position"
+    assert known.unit == "m" and known.quantity == "rod3.tip.position"
     best = model.simulate(1.0, "dop853", rtol=1e-9, atol=1e-11, output_times=run.t)
     way = run.position("rod3.tip") - best.position("rod3.tip")
     assert known.estimate is not None
@@ -148,8 +148,8 @@ def boom(torque: float, modes: int = 3, zeta: float = 0.0) -> mstmm.Model:
 def test_a_beam_that_begins_to_vibrate_is_tried_by_the_exponential_method(asked: float) -> None:
     model, t_end = boom(1.0), 2.0
     run = model.simulate(t_end, error=asked, error_of="boom.tip.position")
-    known = run.error_estimate
-    assert known is not None and known.met and known.estimate is not None
+    known = run.achieved_error
+    assert known is not None and known.is_met and known.estimate is not None
     assert known.runs[0].method == "exprb32" and not known.runs[0].failure
     best = model.simulate(t_end, "dop853", rtol=1e-11, atol=1e-13, output_times=run.t)
     way = run.position("boom.tip") - best.position("boom.tip")
@@ -163,7 +163,7 @@ def test_a_beam_that_nothing_shakes_is_followed_by_others() -> None:
     assert starts_vibrating(boom(0.0), 0.0, q, np.array([0.0, 0.0, 0.0, 0.1]))
     many = boom(5.0, modes=6)
     assert not starts_vibrating(many, 0.0, *many.initial_state())
-    known = boom(0.0).simulate(2.0, error=1e-3).error_estimate
+    known = boom(0.0).simulate(2.0, error=1e-3).achieved_error
     assert known is not None and "exprb32" not in {one.method for one in known.runs}
 
 
@@ -172,8 +172,8 @@ def test_an_exponential_run_that_takes_too_many_steps_is_given_up(
 ) -> None:
     monkeypatch.setattr(method_choice, "_EXPONENTIAL_STEPS", 2)
     monkeypatch.setattr(method_choice, "_EXPONENTIAL_STEPS_PER_RADIAN", 0.0)
-    known = boom(5.0).simulate(2.0, error=1e-3).error_estimate
-    assert known is not None and known.met
+    known = boom(5.0).simulate(2.0, error=1e-3).achieved_error
+    assert known is not None and known.is_met
     assert [one.method for one in known.runs if one.failure] == ["exprb32"]
     assert "exprb32" not in {one.method for one in known.runs if not one.failure}
 
@@ -182,25 +182,25 @@ def test_an_exponential_run_that_takes_too_many_steps_is_given_up(
 def test_vibration_that_is_gone_soon_is_left_to_implicit_steps(t_end: float, method: str) -> None:
     """|lambda| T of 3200 and 6400, where implicit steps, which follow it while it counts, pay from
     1100 on."""
-    known = boom(1.0, zeta=0.05).simulate(t_end, error=1e-3).error_estimate
-    assert known is not None and known.met
+    known = boom(1.0, zeta=0.05).simulate(t_end, error=1e-3).achieved_error
+    assert known is not None and known.is_met
     assert known.runs[0].method == method
 
 
 def test_a_short_one_is_followed_by_explicit_steps() -> None:
-    known = boom(5.0).simulate(0.3, error=1e-3).error_estimate
-    assert known is not None and known.met
+    known = boom(5.0).simulate(0.3, error=1e-3).achieved_error
+    assert known is not None and known.is_met
     assert {one.method for one in known.runs} <= {"dopri5", "dop853"}
 
 
 def test_beyond_the_horizon_it_says_that_nothing_is_known() -> None:
     run = pendulums(3, 2.9).simulate(40.0, error=1e-6)
-    known = run.error_estimate
-    assert known is not None and not known.met
+    known = run.achieved_error
+    assert known is not None and not known.is_met
     assert run.success and not run.trusted
-    assert "the motion is unpredictable" in known.why
+    assert "the motion is unpredictable" in known.reason
     assert known.warning in run.warnings
-    assert known.warning in run.certificate.verdict().against
+    assert known.warning in run.certificate.verdict().objections
     assert run.certificate.predictable_until is not None
     assert 2 < run.certificate.predictable_until < 40
 
@@ -211,8 +211,8 @@ def test_the_asked_times_are_those_of_the_result_and_others_are_looked_at() -> N
     assert run.t.tolist() == [10.0] and run.settings.output_times == (10.0,)
     assert len(run.q) == len(run.u) == len(run.work) == len(run.event) == 1
     whole = model.simulate(10.0, error=1e-6, output_times=np.linspace(0, 10, 101))
-    assert run.error_estimate is not None and whole.error_estimate is not None
-    assert run.error_estimate.estimate == whole.error_estimate.estimate
+    assert run.achieved_error is not None and whole.achieved_error is not None
+    assert run.achieved_error.estimate == whole.achieved_error.estimate
     np.testing.assert_array_equal(run.q[-1], whole.q[-1])
 
 
@@ -223,7 +223,7 @@ def test_without_times_there_are_two_hundred_samples() -> None:
 
 def test_the_same_again_to_the_last_bit() -> None:
     runs = [pendulums(2, 2.0).simulate(4.0, error=1e-5) for _ in range(2)]
-    a, b = (run.error_estimate for run in runs)
+    a, b = (run.achieved_error for run in runs)
     assert a is not None and b is not None
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
     bare = [replace(x, runs=tuple(replace(one, cpu_s=0.0) for one in x.runs)) for x in (a, b)]
@@ -234,7 +234,7 @@ def test_its_method_and_tolerances_give_it_again_but_for_the_first_step() -> Non
     """Which is shorter than that of a run alone, so that the runs have no steps in common."""
     model = pendulums(2, 2.0)
     run = model.simulate(4.0, error=1e-5)
-    known = run.error_estimate
+    known = run.achieved_error
     assert known is not None and known.estimate is not None
     again = model.simulate(4.0, known.method, rtol=known.rtol, atol=known.atol, output_times=run.t)
     np.testing.assert_allclose(run.q, again.q, rtol=0, atol=2 * known.estimate)
@@ -244,8 +244,8 @@ def test_its_method_and_tolerances_give_it_again_but_for_the_first_step() -> Non
 
 def test_a_method_that_was_named_is_kept() -> None:
     run = pendulums(1, 2.0).simulate(2.0, "dopri5", error=1e-5)
-    assert run.error_estimate is not None and run.error_estimate.met
-    assert {one.method for one in run.error_estimate.runs} == {"dopri5"}
+    assert run.achieved_error is not None and run.achieved_error.is_met
+    assert {one.method for one in run.achieved_error.runs} == {"dopri5"}
 
 
 def test_an_event_that_stops_the_run() -> None:
@@ -253,14 +253,14 @@ def test_an_event_that_stops_the_run() -> None:
     event = {"when": "rod0.tip.x < 0", "do": "stop"}
     model = mstmm.compile(mstmm.Scene(**tables, event=[event]), engine="looped")
     run = model.simulate(5.0, error=1e-7)
-    assert run.success and run.error_estimate is not None and run.error_estimate.met
+    assert run.success and run.achieved_error is not None and run.achieved_error.is_met
     fall = 2 * ellipk(math.sin(0.5) ** 2) / math.sqrt(1.5 * G) / 2
     assert run.last_state[0] == pytest.approx(fall, abs=1e-6)
 
 
 def test_a_run_that_fails_is_returned_as_it_is() -> None:
     run = pendulums(2, 2.0).simulate(5.0, error=1e-5, max_steps=3)
-    known = run.error_estimate
+    known = run.achieved_error
     assert known is not None and known.estimate is None and not run.success
     assert known.runs[0].failure == run.message
     assert not run.trusted
@@ -268,14 +268,14 @@ def test_a_run_that_fails_is_returned_as_it_is() -> None:
 
 def test_a_later_run_that_fails_leaves_the_one_before() -> None:
     model = pendulums(2, 2.0)
-    first = model.simulate(5.0, error=1e-8).error_estimate
+    first = model.simulate(5.0, error=1e-8).achieved_error
     assert first is not None
     loose = first.runs[0]
     alone = model.simulate(5.0, rtol=loose.rtol, atol=loose.atol)
     run = model.simulate(5.0, error=1e-8, max_steps=_counts(alone).steps + 1)
-    known = run.error_estimate
-    assert known is not None and not known.met and run.success
-    assert "failed" in known.why and known.runs[-1].failure
+    known = run.achieved_error
+    assert known is not None and not known.is_met and run.success
+    assert "failed" in known.reason and known.runs[-1].failure
     assert not run.trusted
 
 
@@ -290,8 +290,8 @@ def test_an_implicit_run_that_finds_no_step_gives_way(monkeypatch: pytest.Monkey
         return replace(run, status=Status.STEP_TOO_SMALL) if failing else run
 
     monkeypatch.setattr(tolerance_search, "first_run", first_run)
-    known = model.simulate(0.3, error=1e-3).error_estimate
-    assert known is not None and known.met
+    known = model.simulate(0.3, error=1e-3).achieved_error
+    assert known is not None and known.is_met
     assert [one.method for one in known.runs if one.failure] == ["rodas4p2"]
     assert {one.method for one in known.runs if not one.failure} == {"auto"}
 
@@ -301,8 +301,8 @@ def test_a_first_run_that_takes_too_many_steps_is_given_up_to_auto(
 ) -> None:
     monkeypatch.setattr(method_choice, "_PILOT_STEPS", 10)
     run = pendulums(2, 2.0).simulate(4.0, error=1e-5)
-    known = run.error_estimate
-    assert known is not None and known.met
+    known = run.achieved_error
+    assert known is not None and known.is_met
     assert [one.method for one in known.runs if one.failure] == ["dop853"]
     assert {one.method for one in known.runs if not one.failure} == {"auto"}
     assert run.settings.max_steps == 0
@@ -310,7 +310,7 @@ def test_a_first_run_that_takes_too_many_steps_is_given_up_to_auto(
 
 def test_a_run_of_no_length() -> None:
     run = pendulums(1, 1.0).simulate(0.0, error=1e-6)
-    assert run.error_estimate is not None and run.error_estimate.estimate == 0.0
+    assert run.achieved_error is not None and run.achieved_error.estimate == 0.0
 
 
 def test_progress_never_falls() -> None:
@@ -324,13 +324,13 @@ def test_progress_never_falls() -> None:
 def test_a_saved_result_tells_it(tmp_path: Path) -> None:
     run = pendulums(1, 2.0).simulate(3.0, error=1e-6, error_of=["rod0.tip.x", "energy.kinetic"])
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
-    assert again.error_estimate == run.error_estimate
+    assert again.achieved_error == run.achieved_error
     assert again.trusted == run.trusted
     assert json.loads(file_attributes(run)["error_estimate"])["asked"] == 1e-6
 
 
 def test_a_run_without_it_tells_nothing() -> None:
-    assert pendulums(1, 1.0).simulate(1.0).error_estimate is None
+    assert pendulums(1, 1.0).simulate(1.0).achieved_error is None
 
 
 @pytest.mark.parametrize(
@@ -362,8 +362,8 @@ def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> 
 
 def test_an_error_in_a_unit_may_be_above_one() -> None:
     run = pendulums(1, 1.5).simulate(3.0, error=2.0, error_of="pin0.force")
-    known = run.error_estimate
-    assert known is not None and known.met and known.unit == "N"
+    known = run.achieved_error
+    assert known is not None and known.is_met and known.unit == "N"
     again = pendulums(1, 1.5).simulate(3.0, output_times=run.t)
     way = np.linalg.norm(run.force("pin0") - again.force("pin0"), axis=1)
     assert known.estimate is not None

@@ -76,8 +76,8 @@ def satellite_truth() -> Array:
 @pytest.mark.parametrize("asked", [1e-6, 1e-7, 1e-8])
 def test_of_a_switched_satellite(asked: float, satellite_truth: Array) -> None:
     run = satellite().simulate(6.0, error=asked, output_times=np.linspace(0.0, 6.0, 61))
-    known = run.error_estimate
-    assert known is not None and known.met and known.estimate is not None
+    known = run.achieved_error
+    assert known is not None and known.is_met and known.estimate is not None
     off = np.abs(run.q - satellite_truth).max(axis=0)
     shapes = np.abs(satellite_truth[:, 7:]).max()
     true = max(2 * off[3:7].max(), off[7:].max() / shapes)  # an angle is twice a quaternion's
@@ -150,8 +150,8 @@ def test_of_a_rolling_coin(asked: float) -> None:
     model = coin()
     q, u = model.initial_state()
     run = model.simulate(3.0, error=asked)
-    known = run.error_estimate
-    assert known is not None and known.met and known.estimate is not None
+    known = run.achieved_error
+    assert known is not None and known.is_met and known.estimate is not None
     w, x, y, z = run.q[:, 3:7].T
     axis = np.column_stack(
         [2 * (x * y - w * z), w * w - x * x + y * y - z * z, 2 * (y * z + w * x)]

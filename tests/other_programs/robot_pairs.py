@@ -72,7 +72,7 @@ class Pair:
 
     def _draw(self, number: int, rng: np.random.Generator) -> None:
         joint, name = self.peer.joints[number], self.peer.names[number]
-        hinges = self.model.layout.hinges
+        hinges = self.model.coordinate_layout.hinges
         if name == "root_joint":
             flying = next(h.name for h in self.one.scene.hinge if h.inboard == "ground")
             turn, slots = rng.normal(size=4), hinges[flying]
@@ -96,7 +96,7 @@ class Pair:
         flying = [hinge.name for hinge in self.one.scene.hinge if hinge.type == "free"]
         if not flying:
             return self.ours, self.theirs
-        first = self.model.layout.hinges[flying[0]].u
+        first = self.model.coordinate_layout.hinges[flying[0]].u
         return [*range(first, first + 6), *self.ours], [*range(6), *self.theirs]
 
     def mass(self) -> Any:

@@ -33,7 +33,7 @@ class Mechanism:
 
     def __init__(self, scene: dict[str, Any], rng: np.random.Generator) -> None:
         self.model = model = mstmm.compile(mstmm.Scene(**scene))
-        cut = model.loops.cut
+        cut = model.loops.cut_hinges
         self.hinges = [hinge for hinge in scene["hinge"] if hinge["name"] not in cut]
         closing = [hinge for hinge in scene["hinge"] if hinge["name"] in cut]
         assert closing and all(hinge["type"] == "ball" for hinge in closing)
@@ -41,13 +41,13 @@ class Mechanism:
         self.tree = scene | {"hinge": self.hinges}
         start, _ = model.initial_state()
         u = np.zeros(model.nu)
-        for name, slots in model.layout.hinges.items():
+        for name, slots in model.coordinate_layout.hinges.items():
             if name == "foot" or name.startswith("slide"):  # these are free
                 u[slots.u] = rng.uniform(-1, 1)
         self.q, self.u = model.assemble(start + rng.uniform(-0.1, 0.1, model.nq), u, hold=[])
 
     def of_tree(self, values: Any, kind: str) -> Any:
-        slots = [self.model.layout.hinges[hinge["name"]] for hinge in self.hinges]
+        slots = [self.model.coordinate_layout.hinges[hinge["name"]] for hinge in self.hinges]
         return np.concatenate([values[getattr(one, kind)] for one in slots])
 
 

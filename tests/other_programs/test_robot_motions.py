@@ -110,7 +110,7 @@ def test_mujocos_rk4_step_by_step(name: str) -> None:
     step, steps = 1e-3, 200
     pair, peer = damped(name), mujoco_of(name, step)
     data = mujoco.MjData(peer)
-    places = [pair.model.layout.hinges[pair.one.joints[peer.joint(k).name]]
+    places = [pair.model.coordinate_layout.hinges[pair.one.joints[peer.joint(k).name]]
               for k in range(peer.njnt)]  # fmt: skip
     for k, slots in enumerate(places):
         data.qpos[peer.jnt_qposadr[k]] = pair.q[slots.q]

@@ -47,7 +47,8 @@ def differences(pair: Pair, rates_too: bool) -> dict[str, float]:
         "mass matrix": apart(model.mass_matrix(pair.q)[np.ix_(ours, ours)], whole[both]),
         "frames": frames(pair),
         "bias": apart(
-            model.bias(*given)[ours], pin.nonLinearEffects(peer, data, pair.at, pair.speeds)[theirs]
+            model.bias_efforts(*given)[ours],
+            pin.nonLinearEffects(peer, data, pair.at, pair.speeds)[theirs],
         ),
         **moving(pair),
         **({"derivatives": derivatives(pair) / solved} if rates_too else {}),
@@ -159,7 +160,7 @@ def states(one: ImportedRobot, model: mstmm.Model, peer: Any, rng: np.random.Gen
     mujoco.mj_integratePos(peer, at, rng.uniform(-1, 1, peer.nv), 1.0)
     q, u, ours, theirs = np.zeros(model.nq), np.zeros(model.nu), list[int](), list[int]()
     for joint in range(peer.njnt):
-        slots = model.layout.hinges[one.names[peer.joint(joint).name]]
+        slots = model.coordinate_layout.hinges[one.names[peer.joint(joint).name]]
         a, v = int(peer.jnt_qposadr[joint]), int(peer.jnt_dofadr[joint])
         q[slots.q : slots.q + slots.nq] = at[a : a + slots.nq]
         if slots.nu == 6:
@@ -192,7 +193,7 @@ def test_other_units_only_scale_what_has_lengths(tmp_path: Path, rng: np.random.
     robot = convert_units(read_mjcf(str(path), path.name), Units(1e-3, 2e-3), gravity=True)
     peer, model = mujoco.MjModel.from_xml_path(str(path)), mstmm.compile(one.scene)
     q, u, data, ours, theirs = states(one, model, peer, rng)
-    rail, sky = (model.layout.hinges[one.names[name]] for name in ("rail", "sky"))
+    rail, sky = (model.coordinate_layout.hinges[one.names[name]] for name in ("rail", "sky"))
     q[rail.q] *= 1e-3
     u[rail.u] *= 1e-3
     q[sky.q : sky.q + 3] *= 1e-3

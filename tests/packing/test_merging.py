@@ -59,13 +59,13 @@ def test_drawn_scenes_are_the_same(seed: int) -> None:
     scene = mstmm.Scene(**random_scene(seed, types=KINDS))
     few, all_ = both(scene)
     merged = {one.elements for one in otherwise(few)}
-    assert few.packed.topology.count == len(scene.body) - len(merged)
-    assert few.layout.q_names == all_.layout.q_names and not otherwise(all_)
+    assert few.packed_scene.topology.count == len(scene.body) - len(merged)
+    assert few.coordinate_layout.q_names == all_.coordinate_layout.q_names and not otherwise(all_)
     q, u = random_state(random_scene(seed, types=KINDS), seed)
     assert worst(few.accelerations(q, u, 0.3), all_.accelerations(q, u, 0.3)) < TOLERANCE
     assert worst(few.mass_matrix(q), all_.mass_matrix(q)) < TOLERANCE
     runs = [one.simulate(0.02, "rk4", step=0.005) for one in (few, all_)]
-    for name in runs[0].names():
+    for name in runs[0].quantity_names():
         values = [run.quantity(name).values for run in runs]
         size = max(np.abs(values[1]).max(initial=0.0), 1.0)
         assert np.abs(values[0] - values[1]).max(initial=0.0) <= 1e-10 * size, name
@@ -205,7 +205,7 @@ def test_flexible_bodies_hang_on_parts(level: str) -> None:
     q, u = few.initial_state()
     assert worst(few.accelerations(q, u), all_.accelerations(q, u)) < 1e-11
     if level == "coupled":
-        shares = [one.linearize(q, u).modes().kinetic() for one in (few, all_)]
+        shares = [one.linearize(q, u).modes().kinetic_energy_shares() for one in (few, all_)]
         assert shares[0].keys() == shares[1].keys() and "rod4" in shares[0]
         assert worst(*(list(share.values()) for share in shares)) < 1e-9
 

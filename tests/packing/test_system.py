@@ -81,7 +81,7 @@ def test_another_number_is_another_system() -> None:
     stiffer = mstmm.compile(arm(), engine="looped").with_parameters(
         {"blade.bending_stiffness[0]": 99}
     )
-    assert made(arm()) != stiffer.packed.system
+    assert made(arm()) != stiffer.packed_scene.system
 
 
 def test_a_system_holds_nothing_of_c() -> None:
@@ -167,7 +167,7 @@ def test_c_has_the_numbers_of_the_system(scene: mstmm.Scene) -> None:
 def test_places_follow_from_member_to_member() -> None:
     scene = mstmm.Scene(**chain(11))
     model = mstmm.compile(scene, engine="looped")
-    layout, places = model.layout, model.packed.system.places
+    layout, places = model.coordinate_layout, model.packed_scene.system.places
     assert (places["q"] == layout.q_places).all() and (places["u"] == layout.u_places).all()
-    rows = model.packed.system.rows(lambda body: body.nu)
+    rows = model.packed_scene.system.rows(lambda body: body.nu)
     assert (np.diff([*places["u"], model.nu]) == rows).all()

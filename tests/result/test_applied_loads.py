@@ -25,14 +25,14 @@ def values(run: Result, name: str) -> np.ndarray:
 
 def test_the_powers_of_all_that_acts_are_the_power_of_the_scene(run: Result) -> None:
     dampers = (
-        -(run.speed("elbow") ** 2 @ [0.2, 0.1]) - 0.4 * values(run, "spring1.length_rate") ** 2
+        -(run.speeds("elbow") ** 2 @ [0.2, 0.1]) - 0.4 * values(run, "spring1.length_rate") ** 2
     )
     given = values(run, "load1.power") + values(run, "slider.motor_power")
     np.testing.assert_allclose(given + dampers, run.power(), atol=1e-11 * np.ptp(run.power()))
     every = sum(values(run, f"{name}.power") for name in ("elbow", "slider", "wrist", "space"))
-    stiff = run.coordinate("elbow") * run.speed("elbow") @ [3.0, 2.0]
+    stiff = run.coordinates("elbow") * run.speeds("elbow") @ [3.0, 2.0]
     np.testing.assert_allclose(
-        every, values(run, "slider.motor_power") - stiff - run.speed("elbow") ** 2 @ [0.2, 0.1],
+        every, values(run, "slider.motor_power") - stiff - run.speeds("elbow") ** 2 @ [0.2, 0.1],
         atol=1e-12,
     )  # fmt: skip
 
@@ -44,7 +44,7 @@ def test_a_load_in_body_axes_turns_with_the_body(run: Result) -> None:
     np.testing.assert_allclose(values(run, "load1.force"), turned, atol=1e-13)
     power = np.sum(turned * run.velocity("arm.tip"), axis=1)
     np.testing.assert_allclose(values(run, "load1.power"), power, atol=1e-12)
-    assert "load1.moment" not in run.names()
+    assert "load1.moment" not in run.quantity_names()
 
 
 def test_a_spring_pulls_along_its_line(run: Result) -> None:
@@ -59,7 +59,7 @@ def test_a_spring_pulls_along_its_line(run: Result) -> None:
 
 @pytest.mark.parametrize("reference", ["arm.tip", "wheel", "wrist"])
 def test_euler_angles_are_those_of_scipy(run: Result, reference: str) -> None:
-    q = run.coordinate("wrist") if reference == "wrist" else run.orientation(reference)
+    q = run.coordinates("wrist") if reference == "wrist" else run.orientation(reference)
     known = Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_euler("ZYX")
     found = values(run, f"{reference}.euler")
     np.testing.assert_allclose(found, np.unwrap(known, axis=0), atol=1e-12)
@@ -99,7 +99,7 @@ def test_motors_follow_what_a_controller_holds_and_drives_what_they_need(tmp_pat
     np.testing.assert_array_equal(values(run, "strut.motor"), 2 * held)
     np.testing.assert_array_equal(values(run, "strut.effort"), 2 * held)
     np.testing.assert_array_equal(values(run, "first.motor"), run.effort("first")[:, 0])
-    np.testing.assert_allclose(values(run, "heat"), -0.3 * run.speed("second")[:, 0] ** 2,
+    np.testing.assert_allclose(values(run, "heat"), -0.3 * run.speeds("second")[:, 0] ** 2,
                                atol=1e-13)  # fmt: skip
     put_in = sum(values(run, f"{name}.motor_power") for name in ("first", "second", "strut"))
     np.testing.assert_allclose(put_in + values(run, "heat"), run.power(), atol=1e-11)

@@ -57,9 +57,9 @@ def test_a_wheel_that_would_hop_is_not_trusted() -> None:
     expected = normal_load(40.0, times)
     np.testing.assert_allclose(run.quantity("road.load").values, expected, atol=1e-6)
     (risk,) = [one for one in run.risks if one.name == "pulling-contact"]
-    assert risk.doubt and risk.element == 'constraint "road"' and risk.unit == "N"
-    assert risk.figure == pytest.approx(expected.min(), abs=1e-6) and expected.min() < -40
-    assert f"from t = {times[np.argmax(expected < 0)]:.6g} s on" in risk.means
+    assert risk.invalidates and risk.element == 'constraint "road"' and risk.unit == "N"
+    assert risk.value == pytest.approx(expected.min(), abs=1e-6) and expected.min() < -40
+    assert f"from t = {times[np.argmax(expected < 0)]:.6g} s on" in risk.description
     assert run.success and not run.trusted
 
 
@@ -77,7 +77,7 @@ def test_a_road_above_the_wheel_pulls_at_rest() -> None:
     tables["body"][0]["center_of_mass"] = [0, 0, OFF]
     run = mstmm.compile(mstmm.Scene(**tables)).simulate(0.2)
     (risk,) = [one for one in run.risks if one.name == "pulling-contact"]
-    assert risk.figure == pytest.approx(-MASS * G)
+    assert risk.value == pytest.approx(-MASS * G)
 
 
 @pytest.mark.parametrize(("gravity", "doubt"), [(-G, None), (0.0, None), (G, True)])
@@ -108,6 +108,6 @@ def test_of_loads_that_rigid_bodies_leave_open_the_sum_counts(
     }  # fmt: skip
     run = mstmm.compile(mstmm.Scene(**tables)).simulate(0.5)
     found = [one for one in run.risks if one.name == "pulling-contact"]
-    assert bool(found) is (doubt is not None) and all(one.doubt is doubt for one in found)
+    assert bool(found) is (doubt is not None) and all(one.invalidates is doubt for one in found)
     if found:
-        assert found[0].figure == pytest.approx(-14 * G)
+        assert found[0].value == pytest.approx(-14 * G)

@@ -82,7 +82,7 @@ def test_outputs_have_units_labels_and_components() -> None:
     np.testing.assert_array_equal(r.quantity("turn.w").values, r.orientation("rod2")[:, 0])
     np.testing.assert_array_equal(r.quantity("push.y").values, r.momentum()[:, 1])
     assert "height = rod1.tip.y + rod2.tip.y/span" in r.quantity("height").long_name
-    assert {"height", "hand", "hand.z", "turn.w"} <= set(r.names())
+    assert {"height", "hand", "hand.z", "turn.w"} <= set(r.quantity_names())
     with pytest.raises(SceneError, match='did you mean "height"'):
         r.quantity("heigth")
 
@@ -109,7 +109,7 @@ def test_the_error_of_an_output_can_be_asked_for() -> None:
     model = mstmm.compile(scene(HEIGHT), engine="looped")
     loose = model.simulate(1.0, error=1e-4, error_of="height")
     tight = model.simulate(1.0, rtol=1e-11, atol=1e-13, output_times=loose.t)
-    assert loose.error_estimate is not None and "m of height" in str(loose.error_estimate)
+    assert loose.achieved_error is not None and "m of height" in str(loose.achieved_error)
     apart = loose.outputs()["height"] - tight.outputs()["height"]
     assert np.abs(apart).max() < 1e-4
 
@@ -210,7 +210,7 @@ def test_an_output_that_is_no_number_is_told(formula: str) -> None:
     )  # fmt: skip
     run = mstmm.compile(scene).simulate(0.1, certify=True)
     (risk,) = (one for one in run.risks if one.name == "not-finite")
-    assert risk.element == 'output "lost"' and "first at t = 0 s" in risk.means
+    assert risk.element == 'output "lost"' and "first at t = 0 s" in risk.description
     assert run.success and not run.trusted and any("lost" in text for text in run.warnings)
 
 
@@ -221,4 +221,4 @@ def test_a_result_without_samples_has_outputs_of_none() -> None:
         hinge=[{"name": "pin", "type": "pin", "inboard": "ground", "outboard": "bob"}],
     )  # fmt: skip
     run = mstmm.compile(scene).simulate(0.1, output_times=[])
-    assert run.outputs()["twice"].shape == (0,) and not [x for x in run.risks if x.doubt]
+    assert run.outputs()["twice"].shape == (0,) and not [x for x in run.risks if x.invalidates]

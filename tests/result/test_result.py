@@ -83,8 +83,8 @@ def test_ends_are_fixed_in_their_bodies(run: Result) -> None:
 
 def test_rates_of_the_coordinates(run: Result) -> None:
     np.testing.assert_allclose(slope(run.u), run.udot[3], atol=1e-6)
-    np.testing.assert_allclose(slope(run.coordinate("elbow")), run.speed("elbow")[3], atol=1e-7)
-    assert run.coordinate("wrist").shape == (7, 4) and run.speed("wrist").shape == (7, 3)
+    np.testing.assert_allclose(slope(run.coordinates("elbow")), run.speeds("elbow")[3], atol=1e-7)
+    assert run.coordinates("wrist").shape == (7, 4) and run.speeds("wrist").shape == (7, 3)
 
 
 def loads_on(result: Result, k: int) -> dict[str, tuple[Array, Array, Array]]:
@@ -153,8 +153,8 @@ def test_energies_and_momentum_are_sums_over_the_bodies(run: Result) -> None:
         momentum = momentum + body.mass * v
         turning = turning + np.cross(x, body.mass * v) + turned(run.orientation(body.name), spin)
     length = np.linalg.norm(run.position("paddle") - [1, 1, 0], axis=1)
-    hinge = run.coordinate("elbow") ** 2 @ np.array([3.0, 2.0]) / 2
-    parts = run.energies()
+    hinge = run.coordinates("elbow") ** 2 @ np.array([3.0, 2.0]) / 2
+    parts = run.energy_components()
     np.testing.assert_allclose(parts["kinetic"], kinetic, rtol=1e-12)
     np.testing.assert_allclose(parts["gravity"], gravity, atol=1e-11)
     np.testing.assert_allclose(parts["springs"], 4.0 * (length - 0.3) ** 2 + hinge, atol=1e-12)
@@ -170,7 +170,7 @@ def test_work_is_the_integral_of_the_power(run: Result) -> None:
 
 
 def test_efforts_are_those_of_the_laws(run: Result) -> None:
-    q, u = run.coordinate("elbow"), run.speed("elbow")
+    q, u = run.coordinates("elbow"), run.speeds("elbow")
     np.testing.assert_allclose(run.effort("elbow"), -q * [3.0, 2.0] - u * [0.2, 0.1], atol=1e-11)
     t = run.t
     expected = np.stack([0.5 * np.sin(3 * t), 0.2 * np.cos(t)], 1)
@@ -206,9 +206,9 @@ def test_a_driven_coordinate_is_exact_at_every_output_time() -> None:
     )  # fmt: skip
     t = np.linspace(0, 2, 33)
     run = mstmm.compile(scene).simulate(2.0, output_times=t, rtol=1e-5)
-    np.testing.assert_allclose(run.coordinate("motor")[:, 0], 0.5 * np.sin(3 * t), atol=1e-15)
-    np.testing.assert_allclose(run.speed("motor")[:, 0], 1.5 * np.cos(3 * t), atol=1e-15)
-    np.testing.assert_allclose(np.linalg.norm(run.coordinate("free"), axis=1), 1, atol=1e-15)
+    np.testing.assert_allclose(run.coordinates("motor")[:, 0], 0.5 * np.sin(3 * t), atol=1e-15)
+    np.testing.assert_allclose(run.speeds("motor")[:, 0], 1.5 * np.cos(3 * t), atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(run.coordinates("free"), axis=1), 1, atol=1e-15)
     np.testing.assert_allclose(run.udot[:, 0], -4.5 * np.sin(3 * t), atol=1e-14)
 
 
@@ -228,7 +228,7 @@ def test_quantities_by_name_have_units(run: Result) -> None:
         "arm.orientation.w": ("", run.orientation("arm")[:, 0]),
         "wrist.fx": ("N", run.force("wrist")[:, 0]),
         "wrist.moment.z": ("N*m", run.moment("wrist")[:, 2]),
-        "energy": ("J", run.energy()), "energy.springs": ("J", run.energies()["springs"]),
+        "energy": ("J", run.energy()), "energy.springs": ("J", run.energy_components()["springs"]),
         "momentum.x": ("kg*m/s", run.momentum()[:, 0]), "work": ("J", run.work),
         "power": ("W", run.power()),
     }  # fmt: skip
@@ -236,7 +236,7 @@ def test_quantities_by_name_have_units(run: Result) -> None:
         quantity = run.quantity(name)
         assert quantity.unit == unit, name
         np.testing.assert_array_equal(quantity.values, values)
-    assert set(expected) <= set(run.names())
+    assert set(expected) <= set(run.quantity_names())
     vector = run.quantity("wrist.force")
     assert vector.labels == ("x", "y", "z") and vector.values.shape == (7, 3)
 

@@ -32,7 +32,7 @@ def test_netcdf_brings_everything_back(run: Result, tmp_path: Path) -> None:
     path = run.save(tmp_path / "run.nc")
     again = mstmm.load_result(path)
     assert again.model.scene == run.model.scene
-    for name in run.names():
+    for name in run.quantity_names():
         np.testing.assert_array_equal(again.quantity(name).values, run.quantity(name).values)
     assert (again.success, again.status, again.message) == (run.success, run.status, run.message)
     assert again.settings == run.settings and again.statistics == run.statistics
@@ -50,14 +50,14 @@ def test_files_without_a_place_for_near_singular_poses(tmp_path: Path) -> None:
     scene["hinge"].append({"name": "ball", "type": "ball", "inboard": "coupler", "outboard": "bob",
                            "law": {"stiffness": [3.0, 3.0, 2.0]}})  # fmt: skip
     run = mstmm.compile(mstmm.Scene(**scene)).simulate(0.05)
-    memory, place = run.trajectory.memory, run.model.packed.system.strained
+    memory, place = run.trajectory.memory, run.model.packed_scene.system.strained
     assert memory[-1, :place].any() and 0 < place < memory.shape[1] - 1
     data = run.to_xarray()
     data = data.isel(memory_place=np.arange(memory.shape[1]) != place)
     data.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
     again = mstmm.load_result(tmp_path / "old.nc")
     np.testing.assert_array_equal(again.trajectory.memory, memory)
-    for name in run.names():
+    for name in run.quantity_names():
         np.testing.assert_array_equal(again.quantity(name).values, run.quantity(name).values)
 
 
@@ -71,7 +71,7 @@ def test_netcdf_is_labelled_with_units_and_provenance(run: Result, tmp_path: Pat
         wrist = data["moment"].sel(hinge="wrist").values
         np.testing.assert_array_equal(wrist, run.moment("wrist"))
         angle = data["q"].sel(coordinate="elbow.angle2")
-        np.testing.assert_array_equal(angle.values, run.coordinate("elbow")[:, 1])
+        np.testing.assert_array_equal(angle.values, run.coordinates("elbow")[:, 1])
         assert str(angle["coordinate_units"].values) == "rad"
         assert "[[hinge]]" in str(data["scene"].values)
         assert json.loads(data.attrs["versions"])["mstmm"] == mstmm.__version__
@@ -101,7 +101,7 @@ def test_a_fixed_step_is_judged_again_and_other_kernels_are_noted(tmp_path: Path
     model = mstmm.compile(motor("0", damping=100.0))
     run = model.simulate(1.0, method="rk4", step=0.02)
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
-    assert again.certificate.step == run.certificate.step is not None
+    assert again.certificate.step_stability == run.certificate.step_stability is not None
     assert again.warnings == run.warnings
     with xarray.open_dataset(tmp_path / "run.nc", engine="h5netcdf") as file:
         data = file.load()
@@ -126,24 +126,24 @@ def test_csv_has_names_units_and_every_digit(run: Result, tmp_path: Path) -> Non
     }
     np.testing.assert_array_equal(values["time [s]"], run.t)
     np.testing.assert_array_equal(values["arm.tip.y [m]"], run.position("arm.tip")[:, 1])
-    np.testing.assert_array_equal(values["elbow.angle1 [rad]"], run.coordinate("elbow")[:, 0])
+    np.testing.assert_array_equal(values["elbow.angle1 [rad]"], run.coordinates("elbow")[:, 0])
     np.testing.assert_array_equal(values["energy [J]"], run.energy())
     np.testing.assert_array_equal(values["wrist.qw"] if "wrist.qw" in values else values["wrist.w"],
-                                  run.coordinate("wrist")[:, 0])  # fmt: skip
+                                  run.coordinates("wrist")[:, 0])  # fmt: skip
 
 
 @pytest.mark.parametrize("ending", ["csv", "mat"])
 def test_columns_come_back_from_tables(run: Result, tmp_path: Path, ending: str) -> None:
     path = run.save(tmp_path / f"run.{ending}")
     again = mstmm.load_result(path)
-    assert isinstance(again, ColumnFile) and len(again.names()) > 200
+    assert isinstance(again, ColumnFile) and len(again.quantity_names()) > 200
     np.testing.assert_array_equal([again.t, again.event], [run.t, run.event])
-    for name in again.names():
+    for name in again.quantity_names():
         ours, theirs = again.quantity(name), run.quantity(name)
         np.testing.assert_array_equal(ours.values, theirs.values)
         assert ours.unit == theirs.unit
     second = mstmm.load_result(again.save(tmp_path / "again.csv"))
-    assert second.names() == again.names()
+    assert second.quantity_names() == again.quantity_names()
     assert "elbow.angle1" in again.table(rows=3)
     for gone in ("certificate", "q", "u", "model", "success", "statistics", "trajectory"):
         with pytest.raises(mstmm.SceneError, match=rf'"{gone}" needs the scene of the run'):
@@ -183,12 +183,12 @@ def test_tables_of_few_columns_are_shown_and_written(tmp_path: Path) -> None:
     path.write_text("time [s],event\n0,0\n1,0\n")
     none = mstmm.load_result(path)
     assert none.table().splitlines()[-1].split() == ["1"]
-    assert mstmm.load_result(none.save(tmp_path / "none.mat")).names() == ()
+    assert mstmm.load_result(none.save(tmp_path / "none.mat")).quantity_names() == ()
 
 
 def test_matlab_finds_names_units_and_the_scene(run: Result, tmp_path: Path) -> None:
     data = loadmat(run.save(tmp_path / "run.mat"))
-    np.testing.assert_array_equal(data["elbow_angle1"][:, 0], run.coordinate("elbow")[:, 0])
+    np.testing.assert_array_equal(data["elbow_angle1"][:, 0], run.coordinates("elbow")[:, 0])
     rows = {str(row[1][0]): (str(row[0][0]), row[2]) for row in data["names"]}
     assert rows["energy"][0] == "energy" and str(rows["elbow.angle1"][1][0]) == "rad"
     assert "[[hinge]]" in str(data["scene"][0])

@@ -38,7 +38,7 @@ def test_one_panel_per_unit_with_names_and_units(run: Result) -> None:
     assert names == [["elbow.angle1", "elbow.angle2"], [f"wrist.force.{x}" for x in "xyz"]]
     x, y = panels[0].lines[1].get_data()
     at = np.searchsorted(x, run.t)
-    np.testing.assert_allclose(y[at], run.coordinate("elbow")[:, 1], atol=1e-12)
+    np.testing.assert_allclose(y[at], run.coordinates("elbow")[:, 1], atol=1e-12)
     assert [len(p.lines) for p in panels] == [2, 1, 3, 1]
 
 
@@ -61,7 +61,7 @@ def test_of_many_hinges_those_are_drawn_that_move_most() -> None:
     assert chosen.names == tuple(f"pin{k}.angle" for k in largest)
     seventh = np.sort(moved)[-7]
     assert chosen.more == f"34 more that move by {seventh:.2g} rad or less"
-    for candidate in run.candidates()[::9]:
+    for candidate in run.default_quantities()[::9]:
         values = run.quantity(candidate.name).values
         assert candidate.moved == np.ptp(values) and candidate.unit == "rad"
     (panel,) = run.plot().axes
@@ -82,7 +82,7 @@ def test_one_quantity_over_another_and_its_rate_over_itself(run: Result) -> None
     (panel,) = run.plot("elbow.angle1", kind="phase").axes
     angle, rate = panel.lines[0].get_data()
     assert panel.get_title("left") == "rate of angle1 of hinge elbow (rad/s)"
-    for q, u in zip(run.coordinate("elbow")[::7, 0], run.speed("elbow")[::7, 0], strict=True):
+    for q, u in zip(run.coordinates("elbow")[::7, 0], run.speeds("elbow")[::7, 0], strict=True):
         assert np.min(np.hypot(angle - q, rate - u)) < 1e-12
     with pytest.raises(mstmm.SceneError, match="its rate is not known"):
         run.plot("energy", kind="phase")

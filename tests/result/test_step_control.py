@@ -52,14 +52,14 @@ def test_loose_tolerances_are_held_to_what_they_leave(rtol: float, bound: float)
     given = StepControl(None, rtol, rtol / 1e3, 8)
     assert given.bound == pytest.approx(bound)
     run = mstmm.compile(pins(1, [1.0]), engine="looped").simulate(5.0, rtol=rtol, atol=rtol / 1e3)
-    assert run.certificate.control.bound == pytest.approx(bound)
+    assert run.certificate.step_control.bound == pytest.approx(bound)
     assert f"balances within {bound:g}" in run.certificate.verdict().bounds
 
 
 def test_a_wanted_error_is_what_balances_are_held_to() -> None:
     run = mstmm.compile(pins(1, [1.0]), engine="looped").simulate(5.0, error=1e-3)
-    assert run.certificate.control.bound == 1e-3
-    text = run.certificate.control.finer(0.01)
+    assert run.certificate.step_control.bound == 1e-3
+    text = run.certificate.step_control.finer(0.01)
     assert text == "ask for an error below 2e-07"
 
 
@@ -74,7 +74,7 @@ def test_a_step_that_becomes_too_long_is_named_with_its_time(stiffer: str, told:
     rows = [risk for risk in run.risks if risk.name == "step-stability"]
     assert bool(rows) == told
     for risk in rows:
-        assert risk.element == 'hinge "motor"' and not risk.before
+        assert risk.element == 'hinge "motor"' and not risk.seen_before_run
         assert risk.limit == pytest.approx(2.83, abs=0.03)
-        found = re.search(r"at t = (\S+) s", risk.means)
+        found = re.search(r"at t = (\S+) s", risk.description)
         assert found is not None and 10.7 < float(found[1]) < 13.0

@@ -47,13 +47,15 @@ def test_bounds_that_are_asked_for_are_those_that_hold() -> None:
     run = mstmm.compile(pins(1, [0.3])).simulate(3.0, certify=True, rtol=1e-6)
     error = run.certificate.error
     assert error is not None
-    size = error.whole()["rad"]
+    size = error.difference()["rad"]
     assert run.certificate.verdict(accuracy=2 * size).trusted
     tight = run.certificate.verdict(accuracy=size / 2)
     assert not tight.trusted
-    assert tight.against[0].startswith("the error of q may be")
+    assert tight.objections[0].startswith("the error of q may be")
     drift = run.certificate.energy.relative
-    assert any("asked for" in text for text in run.certificate.verdict(balance=drift / 2).against)
+    assert any(
+        "asked for" in text for text in run.certificate.verdict(balance=drift / 2).objections
+    )
 
 
 def test_errors_of_lengths_are_judged_by_how_far_they_went() -> None:
@@ -63,8 +65,8 @@ def test_errors_of_lengths_are_judged_by_how_far_they_went() -> None:
     run = mstmm.compile(scene).simulate(40.0, method="rk4", step=0.15, certify=True)
     error = run.certificate.error
     assert error is not None
-    assert error.moved["m"] == pytest.approx(2e-4, rel=0.02)
-    assert 1e-6 < error.whole()["m"] < 1e-3  # small in metres, but not beside the motion
+    assert error.excursion["m"] == pytest.approx(2e-4, rel=0.02)
+    assert 1e-6 < error.difference()["m"] < 1e-3  # small in metres, but not beside the motion
     assert "of 0.0002 m of motion" in str(run.certificate.verdict())
 
 
@@ -78,10 +80,10 @@ def test_a_chaotic_run_is_not_trusted_past_its_horizon() -> None:
 def test_a_run_that_is_wrong_from_its_first_sample_on_has_no_time_up_to_which_it_is_right() -> None:
     run = mstmm.compile(pins(1, [1.5])).simulate(5.0, method="genalpha", step=0.4, certify=True)
     text, error = str(run.certificate), run.certificate.error
-    assert error is not None and error.horizon == 0.0
+    assert error is not None and error.divergence_time == 0.0
     assert "t = 0 s" not in text and "over the whole run" not in text
     assert "the start: from the first sample on the two runs differ" in text
-    assert f"{error.whole()['rad']:.1e} rad (from a second run" in text
+    assert f"{error.difference()['rad']:.1e} rad (from a second run" in text
     assert "(not predictable beyond its start)" in str(run.certificate.verdict())
 
 
@@ -89,7 +91,7 @@ def test_a_failed_run_is_not_trusted_and_says_why_first() -> None:
     run = mstmm.compile(motor("1/(0.5 - t)")).simulate(1.0, certify=True)
     assert not run.success
     assert not run.trusted
-    assert run.certificate.verdict().against[0] == run.message
+    assert run.certificate.verdict().objections[0] == run.message
 
 
 def test_energies_beyond_what_numbers_hold_are_no_success() -> None:

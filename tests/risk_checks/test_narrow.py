@@ -163,7 +163,7 @@ def test_a_run_is_made_again_as_far_as_it_came(monkeypatch: pytest.MonkeyPatch) 
 def test_the_remedy_names_the_coordinate() -> None:
     run = mstmm.compile(motor(PULSE, speed=1.0), engine="looped").simulate(10.0)
     (risk,) = missed_feature_risks(run.model, run.trajectory)
-    assert "near q = 4.9999" in risk.means and "where(q > a" in risk.remedy
-    assert risk.figure is not None and risk.limit is not None
-    assert risk.figure > risk.limit and risk.limit == pytest.approx(0.016, rel=0.7)
+    assert "near q = 4.9999" in risk.description and "where(q > a" in risk.remedy
+    assert risk.value is not None and risk.limit is not None
+    assert risk.value > risk.limit and risk.limit == pytest.approx(0.016, rel=0.7)
     assert not run.trusted

@@ -37,11 +37,11 @@ def test_a_row_reads_as_a_sentence_and_comes_back_from_plain_data() -> None:
 
 def test_numbers_of_rows_are_plain() -> None:
     risk = Risk("a", RUN, "b", "c", np.float64(1.5), np.float32(1.0), "rad")  # type: ignore[arg-type]
-    assert type(risk.figure) is float and type(risk.limit) is float
+    assert type(risk.value) is float and type(risk.limit) is float
     run = swinging().simulate(5.0, method="genalpha", step=0.3)
     assert {risk.name for risk in run.risks} == {"step-accuracy", "energy-drift"}
     for risk in run.risks:
-        assert type(risk.figure) is float and type(risk.limit) is float
+        assert type(risk.value) is float and type(risk.limit) is float
         assert risk.element and risk.remedy and risk.unit == "1"
 
 
@@ -51,7 +51,7 @@ def test_what_a_body_s_model_lacks_has_its_way_out_apart() -> None:
     hold = {"name": "hold", "type": "fixed", "inboard": "ground", "outboard": "boom"}
     scene = mstmm.Scene(gravity=(0, -9.81, 0), beam=[beam], hinge=[hold])
     (risk,) = (r for r in mstmm.compile(scene).simulate(0.1).risks if r.name == "body-model")
-    assert risk.remedy == "give 2 or more" and "cannot represent" in risk.means
+    assert risk.remedy == "give 2 or more" and "cannot represent" in risk.description
 
 
 @pytest.mark.parametrize("wrong", [{"name": 1}, {"figure": "much"}, {"colour": "red"}])
@@ -61,10 +61,10 @@ def test_rows_of_another_kind_are_not_taken(wrong: dict[str, Any]) -> None:
 
 
 def test_what_the_run_has_seen_stands_for_what_was_seen_before() -> None:
-    early = Risk("pivot-loss", 'hinge "a"', "soon", "mend it", before=True)
-    other = Risk("pivot-loss", 'hinge "b"', "soon", "mend it", before=True)
+    early = Risk("pivot-loss", 'hinge "a"', "soon", "mend it", seen_before_run=True)
+    other = Risk("pivot-loss", 'hinge "b"', "soon", "mend it", seen_before_run=True)
     late = Risk("pivot-loss", 'hinge "a"', "now", "mend it")
-    advice = Risk("stiff", RUN, "slow", "be patient", doubt=False)
+    advice = Risk("stiff", RUN, "slow", "be patient", invalidates=False)
     assert order_risks([advice, early, other, late, late]) == (other, late, advice)
 
 
@@ -108,7 +108,7 @@ def test_what_is_only_worth_knowing_refuses_nothing() -> None:
     model = mstmm.compile(pins(1, [7.0]))
     run = model.simulate(1.0, on_risk="refuse")
     (risk,) = run.risks
-    assert (risk.name, risk.element, risk.doubt) == ("degrees", 'hinge "pin0"', False)
+    assert (risk.name, risk.element, risk.invalidates) == ("degrees", 'hinge "pin0"', False)
     assert run.warnings == (str(risk),)
 
 
@@ -193,4 +193,4 @@ def test_a_one_way_response_knows_no_stiffening(axial: float, told: bool) -> Non
     rows = [risk for risk in runs[0].risks if risk.name == "stiffening"]
     assert bool(rows) == told and not [r for r in runs[1].risks if r.name == "stiffening"]
     assert all("coupled" in risk.remedy for risk in rows)
-    assert all(risk.figure == pytest.approx(-axial / 1382, rel=0.02) for risk in rows)
+    assert all(risk.value == pytest.approx(-axial / 1382, rel=0.02) for risk in rows)

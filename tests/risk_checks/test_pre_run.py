@@ -16,7 +16,7 @@ from mstmm.runtime.risk_checks.pre_run import check_before_run
 def seen(scene: mstmm.Scene, t_end: float = 10.0, **settings: Any) -> list[Risk]:
     model = mstmm.compile(scene, engine="looped", sweep="riccati")
     found = check_before_run(model, Settings(t_end, **settings), *model.initial_state()).risks
-    assert all(risk.before for risk in found)
+    assert all(risk.seen_before_run for risk in found)
     return list(found)
 
 
@@ -36,7 +36,7 @@ def chain(masses: list[float]) -> mstmm.Scene:
 def test_a_heavy_tip_is_seen() -> None:
     (risk,) = seen(chain([1.0, 1.0, 1.0, 1.0, 1e11]))
     assert risk.name == "pivot-loss" and risk.element.startswith('hinge "pin')
-    assert risk.figure is not None and risk.figure > 1e9
+    assert risk.value is not None and risk.value > 1e9
 
 
 @pytest.mark.parametrize("root, tip", [(1.0, 1.0), (1e11, 1.0), (1.0, 1e3)])
@@ -99,14 +99,16 @@ def test_a_linear_beam_that_will_be_spun_up(stiffening: bool) -> None:
     found = seen(blade(stiffening, drive=SPIN_UP))
     assert [risk.name for risk in found] == ([] if stiffening else ["stiffening"])
     for risk in found:
-        assert risk.figure == pytest.approx(2 / 3.516, rel=0.01)
+        assert risk.value == pytest.approx(2 / 3.516, rel=0.01)
         assert risk.remedy == "leave stiffening on"
 
 
 def test_the_end_of_the_run_and_the_start_count() -> None:
     assert not seen(blade(False, drive=SPIN_UP), t_end=4.0)
     spinning = {"initial": {"u": [2.0]}}
-    assert [risk.name for risk in seen(blade(False, **spinning)) if risk.doubt] == ["stiffening"]
+    assert [risk.name for risk in seen(blade(False, **spinning)) if risk.invalidates] == [
+        "stiffening"
+    ]
 
 
 def test_a_run_that_spins_a_linear_beam_is_refused() -> None:
@@ -123,7 +125,7 @@ def test_a_run_that_spins_a_linear_beam_is_refused() -> None:
 def test_a_drive_faster_than_the_shapes(rate: float, told: bool) -> None:
     """Two shapes: 3.5 and 22 rad/s."""
     found = seen(blade(True, drive=f"0.001*sin({rate}*t)"))
-    assert [(risk.name, risk.element, risk.doubt) for risk in found] == (
+    assert [(risk.name, risk.element, risk.invalidates) for risk in found] == (
         [("shapes", '"blade"', False)] if told else []
     )
 
@@ -134,7 +136,7 @@ def test_a_drive_faster_than_the_shapes(rate: float, told: bool) -> None:
 def test_a_damper_that_explicit_steps_must_follow(damping: float, method: str, told: bool) -> None:
     """A rod of 1/3 kg m2: 3000 1/s over 10 s."""
     found = seen(motor("0", damping=damping), method=method)
-    assert [(risk.name, risk.doubt) for risk in found] == ([("stiff", False)] if told else [])
+    assert [(risk.name, risk.invalidates) for risk in found] == ([("stiff", False)] if told else [])
 
 
 # --- loads ----------------------------------------------------------------------------------------

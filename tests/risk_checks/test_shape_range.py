@@ -68,19 +68,19 @@ def test_a_response_is_doubted_where_it_errs() -> None:
     linear = compiled().linearize(disturbances=["b.tip.force.y"])
     for omega, right in ((0.5 * CF[2] ** 2, True), (0.97 * CF[2] ** 2, True), (100.0, False)):
         answer = linear.frequency_response([1.0, omega], outputs=["b.tip.position.y"])
-        error = abs(answer.values[1, 0, 0] / receptance(omega) - 1)
+        error = abs(answer.response[1, 0, 0] / receptance(omega) - 1)
         assert (error < 0.05) == right
         assert answer.trusted == right
     (risk,) = (risk for risk in answer.risks if risk.name == "frequency-range")
     assert risk.element == '"b"' and risk.limit == pytest.approx(CF[2] ** 2 / (2 * np.pi), rel=1e-3)
-    assert risk.figure == pytest.approx(100.0 / (2 * np.pi))
+    assert risk.value == pytest.approx(100.0 / (2 * np.pi))
 
 
 def test_exact_beams_have_no_limit() -> None:
     linear = compiled().linearize(disturbances=["b.tip.force.y"])
     answer = linear.frequency_response([100.0], outputs=["b.tip.position.y"], exact=True)
     assert answer.trusted
-    assert abs(answer.values[0, 0, 0]) == pytest.approx(abs(receptance(100.0)), rel=1e-6)
+    assert abs(answer.response[0, 0, 0]) == pytest.approx(abs(receptance(100.0)), rel=1e-6)
 
 
 def test_motions_that_shapes_have_too_high_are_doubted() -> None:
@@ -89,14 +89,14 @@ def test_motions_that_shapes_have_too_high_are_doubted() -> None:
     requested = model.linearize().modes(4)
     assert requested.omega[3] > 1.05 * 10.9955**2
     (risk,) = (risk for risk in requested.risks if risk.name == "frequency-range")
-    assert risk.doubt and "a mode from" in risk.means
+    assert risk.invalidates and "a mode from" in risk.description
     assert model.linearize().modes(3).trusted
 
 
 def test_of_all_modes_the_highest_are_noted_and_no_objection() -> None:
     model = compiled(beam={"basis": "static+fixed-interface", "modes": {"y": 4}})
     every = model.linearize().modes()
-    assert [(risk.name, risk.doubt) for risk in every.risks] == [("frequency-range", False)]
+    assert [(risk.name, risk.invalidates) for risk in every.risks] == [("frequency-range", False)]
     assert every.trusted
 
 

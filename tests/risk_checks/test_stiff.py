@@ -31,13 +31,13 @@ def advised(scene: mstmm.Scene, t_end: float, engine: str = "looped", **how: Any
 def test_what_is_advised_saves_as_much_as_is_said(method: str, engine: str) -> None:
     how: dict[str, Any] = {"rtol": 1e-3, "atol": 1e-6}
     (risk,) = advised(swinging(), 5.0, engine, method=method, **how)
-    assert not risk.doubt and risk.figure is not None and risk.limit is not None
+    assert not risk.invalidates and risk.value is not None and risk.limit is not None
     assert 'method = "rodas4p2"' in risk.remedy
     run = mstmm.compile(swinging(), engine=engine).simulate(5.0, method="rodas4p2", **how)
     each = 30.0 if engine == "looped" else 60.0
     assert run.statistics is not None
     assert 0.5 < risk.limit / each / run.statistics.steps < 3.0
-    assert 1.5 * each * run.statistics.steps < risk.figure
+    assert 1.5 * each * run.statistics.steps < risk.value
 
 
 @pytest.mark.parametrize("engine", ["looped", "fused"])
@@ -55,7 +55,10 @@ def test_a_vibration_that_steps_must_follow_is_let_be(method: str, engine: str) 
 
 def test_before_a_run_the_start_is_looked_at() -> None:
     (risk,) = advised(motor("0", damping=1e3), 100.0, method="dop853", max_steps=100)
-    assert risk.before and "which limits dop853 to about 5e+04 steps in 100 s" in risk.means
+    assert (
+        risk.seen_before_run
+        and "which limits dop853 to about 5e+04 steps in 100 s" in risk.description
+    )
 
 
 @pytest.mark.parametrize("how", [

@@ -50,12 +50,12 @@ def test_a_scene_comes_back_and_moves_alike(tmp_path: Path, rng: np.random.Gener
     one = scene()
     found = back(one, tmp_path, stops=1e3)
     ours, again = mstmm.compile(one), mstmm.compile(found.scene)
-    assert ours.layout.hinges.keys() <= again.layout.hinges.keys()
+    assert ours.coordinate_layout.hinges.keys() <= again.coordinate_layout.hinges.keys()
     q, u = rng.uniform(-0.7, 0.7, (40, ours.nq)), rng.uniform(-1, 1, (40, ours.nu))
     there_q, there_u = np.zeros((40, again.nq)), np.zeros((40, again.nu))
     places = list[tuple[slice, slice]]()
-    for name, slots in ours.layout.hinges.items():
-        other = again.layout.hinges[name]
+    for name, slots in ours.coordinate_layout.hinges.items():
+        other = again.coordinate_layout.hinges[name]
         if slots.nq >= 4:
             turn = q[:, slots.q + slots.nq - 4 : slots.q + slots.nq]
             turn /= np.linalg.norm(turn, axis=1, keepdims=True)
@@ -153,7 +153,7 @@ def excavator(*left_out: str) -> mstmm.Scene:
 def test_a_loop_is_refused_by_the_hinge_that_is_cut() -> None:
     """That of the product's own analysis of loops; either hinge of the bucket may be left out."""
     scene = excavator()
-    (cut,) = mstmm.compile(scene, engine="looped").loops.cut
+    (cut,) = mstmm.compile(scene, engine="looped").loops.cut_hinges
     with pytest.raises(mstmm.SceneError) as told:
         mstmm.export_robot(scene)
     assert str(told.value).startswith(f'hinge "{cut}" closes a loop')

@@ -38,7 +38,7 @@ def test_a_joint_that_mimics_may_be_held(tmp_path: Path) -> None:
     assert not found.scene.coupling
     assert "held at 0.01; it mimics another" in [note.text for note in found.notes]
     run = mstmm.compile(found.scene).simulate(0.2)
-    held = run.model.layout.hinges["other_jaw"].q
+    held = run.model.coordinate_layout.hinges["other_jaw"].q
     assert run.success and np.ptp(run.q[:, held]) == 0 and run.q[0, held] == 0.01
     with pytest.raises(mstmm.SceneError, match='expected "coupled" or "held", found'):
         mstmm.import_robot(path, mimics="frozen")
@@ -63,7 +63,7 @@ def test_what_goes_with_none_of_it_is_held() -> None:
     assert not found.scene.coupling
     assert "held at 0.25; it mimics another" in [note.text for note in found.notes]
     run = mstmm.compile(found.scene, engine="looped").simulate(0.2)
-    assert run.success and (run.coordinate("j1") == 0.25).all()
+    assert run.success and (run.coordinates("j1") == 0.25).all()
 
 
 @pytest.mark.parametrize("merge", [True, False])

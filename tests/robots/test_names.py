@@ -26,7 +26,7 @@ def test_every_link_and_joint_is_found_by_its_own_name(
         if own != "ground":
             assert np.array_equal(run.position(name), run.position(own))
     for name, own in found.joints.items():
-        assert np.array_equal(run.coordinate(name), run.coordinate(own))
+        assert np.array_equal(run.coordinates(name), run.coordinates(own))
     assert run.quantity("shoulder-1.angle").name == "shoulder-1.angle"
 
 

@@ -113,7 +113,7 @@ def test_a_failure_of_a_step_that_is_too_long_is_put_down_to_the_step(hinge: str
     weld = {"name": "weld", "type": "fixed", "inboard": "rod.tip", "outboard": "tip"}
     scene = mstmm.Scene(gravity=(0, -9.81, 0), beam=[beam], body=[tip], hinge=[holds, weld])
     model = mstmm.compile(scene)
-    fine = model.simulate(0.01, method="rk4", step=1e-5).certificate.step
+    fine = model.simulate(0.01, method="rk4", step=1e-5).certificate.step_stability
     assert fine is not None
     result = model.simulate(5.0, method="rk4", step=39 * fine.stable_step)
     assert not result.success
@@ -179,7 +179,7 @@ def test_a_step_that_becomes_too_long_is_said_first() -> None:
     scene = mstmm.Scene(**chain(["pin", "pin"], gravity=(0, -9.81, 0)))
     run = mstmm.compile(scene, engine="looped").simulate(4.0, "rk4", step=0.4)
     assert not run.success
-    assert run.certificate.step is None
+    assert run.certificate.step_stability is None
     assert run.message.startswith("step = 0.4 s is too long for the fastest motion at t = ")
     assert "; the run with it ended: " in run.message
 
@@ -196,4 +196,4 @@ def test_a_run_costs_no_look_at_its_step(monkeypatch: pytest.MonkeyPatch) -> Non
     run = rod(4e4, 0.0).simulate(0.2, method="rk4", step=0.05)
     assert run.success and not calls
     assert any("too long for the fastest motion" in text for text in run.warnings)
-    assert run.certificate.step is not None and not run.trusted and len(calls) == 1
+    assert run.certificate.step_stability is not None and not run.trusted and len(calls) == 1

@@ -91,7 +91,7 @@ def test_the_estimate_bounds_a_third_of_the_true_error(
         error = estimate(run)
         (estimated,) = error.q.values()
         true = true_errors(run, exact(run.t))
-        within = error.t <= (error.horizon or np.inf)
+        within = error.t <= (error.divergence_time or np.inf)
         last = int(within.nonzero()[0][-1])
         assert estimated[last] >= true[last] / 3
         assert estimated[last] <= 30 * true[last] + 1e-13  # and it is no empty bound
@@ -123,22 +123,22 @@ def test_a_double_pendulum_past_its_horizon() -> None:
     true = true_errors(run, best.q)
     assert reference < 0.02 * true[-1]  # both references agree far better than the run does
     error, certificate = estimate(run), run.certificate
-    assert error.horizon is not None and 10 < error.horizon < 19
-    assert certificate.predictable_until == error.horizon
+    assert error.divergence_time is not None and 10 < error.divergence_time < 19
+    assert certificate.predictable_until == error.divergence_time
     assert "predictable until" in str(certificate)
-    before = (error.t <= error.horizon) & (true > 1e-12)
+    before = (error.t <= error.divergence_time) & (true > 1e-12)
     assert np.all(error.q["rad"][before] >= true[before] / 3)
-    assert true[-1] > 0.1 > 0.02 > true[error.t <= error.horizon][-1]
+    assert true[-1] > 0.1 > 0.02 > true[error.t <= error.divergence_time][-1]
     assert certificate.sum_of_local_errors is not None
     assert certificate.sum_of_local_errors < 1e-4 * true[-1]
-    assert error.tenfold is not None and 1 < error.tenfold < 5
+    assert error.tenfold_time is not None and 1 < error.tenfold_time < 5
     assert run.success and certificate.energy.relative < 1e-7  # energy shows nothing of it
 
 
 def test_regular_motion_has_no_horizon_and_no_exponential_growth() -> None:
     run = mstmm.compile(pins(1, [0.3])).simulate(30.0, certify=True)
     error = estimate(run)
-    assert error.horizon is None and error.tenfold is None and not run.warnings
+    assert error.divergence_time is None and error.tenfold_time is None and not run.warnings
     assert set(error.largest("q")) == {"rad"} and set(error.largest("u")) == {"rad/s"}
     assert error.reference == "rtol 1e-11" and "rtol 1e-11" in str(run.certificate)
 
@@ -179,9 +179,9 @@ def test_estimates_of_random_scenes(method: str, rng: np.random.Generator) -> No
         )  # fmt: skip
         if not best.success:
             continue
-        true = compare(model.layout, run.trajectory, best.trajectory, "")
+        true = compare(model.coordinate_layout, run.trajectory, best.trajectory, "")
         error = estimate(run)
-        within = error.t <= (error.horizon or np.inf)
+        within = error.t <= (error.divergence_time or np.inf)
         for unit, values in error.q.items():
             size = true.q[unit][within][-1] / SAFETY
             assert values[within][-1] >= size / 3 - 1e-12, (seed, unit)
@@ -209,5 +209,5 @@ def test_what_moves_by_rounding_alone_is_no_motion_to_lose() -> None:
     moved = np.ptp(result.q[:, 1])
     speed = np.abs(result.u[:, 1]).max()
     assert 0 < max(moved, speed) < 1e-12
-    assert result.certificate.error is not None and result.certificate.error.horizon is None
+    assert result.certificate.error is not None and result.certificate.error.divergence_time is None
     assert result.certificate.verdict().trusted

@@ -30,7 +30,7 @@ def true_error(run: Result) -> float:
 def estimated(run: Result) -> float:
     error = run.certificate.error
     assert error is not None
-    return max(error.whole().values())
+    return max(error.difference().values())
 
 
 @pytest.mark.parametrize("step", [0.3, 0.6, 1.0, 1.5, 2.5, 40.0])
@@ -88,7 +88,7 @@ def test_one_output_time_is_enough_for_an_estimate() -> None:
     )
     error = lost.certificate.error
     assert error is not None
-    assert error.horizon == 0.0
+    assert error.divergence_time == 0.0
     assert estimated(lost) > 0.1
 
 
@@ -110,7 +110,7 @@ def test_a_second_run_that_fails_tells_only_of_the_time_that_it_covers(
     assert error is not None and error.covered is not None and 0.1 < error.covered < 4.0
     assert error.covered == error.t[-1]
     told = f"up to t = {error.covered:.6g} s, none beyond"
-    assert told in run.certificate.text()
+    assert told in run.certificate.as_text()
     assert "the error is not known beyond" in str(run.certificate.verdict())
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
-    assert told in again.certificate.text() and not again.trusted
+    assert told in again.certificate.as_text() and not again.trusted

@@ -114,7 +114,7 @@ def test_steps_that_would_leave_nothing_but_rounding_are_refused() -> None:
 
 
 def test_more_unknowns_than_it_takes_are_refused() -> None:
-    most = get("exprb32").most_unknowns
+    most = get("exprb32").max_unknowns
     for count in (most // 2, most // 2 + 1):
         model = mstmm.compile(mstmm.Scene(**motions.hanging_chain(count)), engine="looped")
         if 2 * count <= most:

@@ -104,7 +104,9 @@ def test_turns_of_a_ball_spring_are_counted_as_in_the_c_loop() -> None:
     t = np.linspace(0, 2, 21)
     ours = model.simulate(2.0, output_times=t, rtol=1e-10)
     run = model.simulate(2.0, method="scipy-DOP853", output_times=t, rtol=1e-9)
-    np.testing.assert_allclose(run.energies()["springs"], ours.energies()["springs"], atol=1e-7)
+    np.testing.assert_allclose(
+        run.energy_components()["springs"], ours.energy_components()["springs"], atol=1e-7
+    )
     np.testing.assert_allclose(run.q, ours.q, atol=1e-6)
     assert ours.trajectory.memory[-1].max() > 2 * np.pi
 

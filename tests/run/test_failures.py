@@ -22,7 +22,7 @@ def check_remains(run: Result) -> None:
     t, q, u = run.last_state
     assert np.isfinite(t) and np.isfinite(q).all() and np.isfinite(u).all()
     assert t == pytest.approx(run.t[-1]) and f"{t:.6g}"[:6] in run.message
-    assert str(run.certificate) and run.table() and len(run.names()) > 10
+    assert str(run.certificate) and run.table() and len(run.quantity_names()) > 10
 
 
 @pytest.mark.parametrize("method, step", [("dop853", None), ("dopri5", None), ("rk4", 1e-3)])

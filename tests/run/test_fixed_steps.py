@@ -59,8 +59,8 @@ def test_the_length_of_a_run_does_not_matter() -> None:
     model = mstmm.compile(scene, engine="looped")
     result = model.simulate(200.0, "genalpha", 0.1, output_times=np.arange(0.0, 200.1, 0.1))
     assert result.statistics is not None
-    assert result.statistics.sum_local_error is not None
-    assert result.statistics.sum_local_error > 0.05 * np.ptp(result.q)
+    assert result.statistics.sum_of_local_errors is not None
+    assert result.statistics.sum_of_local_errors > 0.05 * np.ptp(result.q)
     assert not told(result)
 
 
@@ -75,7 +75,7 @@ def test_energies_are_no_errors_of_the_motion() -> None:
         result = model.simulate(1.0, method, 0.1)
         assert np.ptp(result.work) > 1e8
         assert result.statistics is not None
-        assert result.statistics.sum_local_error == 0.0
+        assert result.statistics.sum_of_local_errors == 0.0
         assert not told(result)
 
 

@@ -109,7 +109,7 @@ def test_adaptive_steps_are_cut_where_a_chain_topples(method: str) -> None:
     run = model.simulate(2.0, method, rtol=1e-2, atol=1e-2)
     assert run.success, run.message
     assert run.statistics is not None
-    assert run.statistics.rejected > 0
+    assert run.statistics.rejected_steps > 0
     assert run.statistics.largest_step is not None
     assert run.statistics.largest_step < 1.01 / (part_of_a_step(tableau) * rate)
     exact = model.simulate(2.0, rtol=1e-11, atol=1e-13, output_times=[2.0])

@@ -43,7 +43,7 @@ def work(result: Result) -> int:
 
 
 def names(result: Result) -> list[str]:
-    return [stretch.method for stretch in result.methods]
+    return [stretch.method for stretch in result.method_history]
 
 
 def pressed() -> dict[str, Any]:
@@ -77,8 +77,8 @@ def test_a_run_that_is_not_stiff_is_that_of_dop853(engine: str, options: dict[st
     model = mstmm.compile(pins(3, [0.3, -0.4, 1.0], damping=0.1), engine=engine)
     auto, plain = (model.simulate(2.0, method=name, **options) for name in ("auto", "dop853"))
     assert equal(auto, plain) and auto.statistics == plain.statistics
-    assert names(auto) == ["dop853"] and plain.methods == ()
-    assert auto.methods[0].rate is None
+    assert names(auto) == ["dop853"] and plain.method_history == ()
+    assert auto.method_history[0].fastest_rate is None
 
 
 @pytest.mark.parametrize("name", ["a10-1e4", "e"])
@@ -99,7 +99,7 @@ def test_an_engine_compiled_on_the_way_changes_nothing(
     long = auto.simulate(400.0, **options)
     assert auto.engine == "fused"
     fused = mstmm.compile(scene, engine="fused").simulate(400.0, **options)
-    assert equal(long, fused) and long.methods == fused.methods
+    assert equal(long, fused) and long.method_history == fused.method_history
 
 
 def test_stiff_rods_take_a_tenth_of_the_work() -> None:
@@ -112,9 +112,9 @@ def test_stiff_rods_take_a_tenth_of_the_work() -> None:
     error = np.linalg.norm(references.places(auto, case) - expected, axis=1).max()
     assert error < 1e-4
     assert work(auto) < work(plain) / 10
-    change = auto.methods[1]
-    assert 0.0 < change.t < 0.1 and change.rate == pytest.approx(34375.0, rel=0.1)
-    assert "stability" in change.why and "rodas4p2 from t = 0.0" in str(change)
+    change = auto.method_history[1]
+    assert 0.0 < change.t < 0.1 and change.fastest_rate == pytest.approx(34375.0, rel=0.1)
+    assert "stability" in change.reason and "rodas4p2 from t = 0.0" in str(change)
     tight = model.simulate(0.1, method="auto", rtol=1e-7, atol=1e-9)
     assert names(tight) == ["dop853", "rodas5p"]
 
@@ -125,9 +125,9 @@ def test_contact_on_and_off_changes_the_method_both_ways() -> None:
     exact = model.simulate(3.0, rtol=1e-10, atol=1e-13)
     assert run.success and names(run) == ["dop853", *["rodas4p2", "dop853"] * 3]
     assert work(run) < work(exact) / 5
-    touching = [run.q[np.searchsorted(run.t, change.t), 0] < 0 for change in run.methods]
+    touching = [run.q[np.searchsorted(run.t, change.t), 0] < 0 for change in run.method_history]
     assert touching == [False, *[True, False] * 3]
-    rates = [change.rate for change in run.methods[1:3]]
+    rates = [change.fastest_rate for change in run.method_history[1:3]]
     assert rates == pytest.approx([1e4, np.sqrt(40)], rel=0.05)
     assert run.q[-1] == pytest.approx(exact.q[-1], abs=1e-4)
     assert run.certificate.energy.relative < 1e-3
@@ -137,7 +137,7 @@ def test_events_breaks_and_releases_go_on_across_a_change() -> None:
     model = compiled(eventful())
     run = model.simulate(2.0, method="auto", rtol=1e-6, atol=1e-8)
     exact = model.simulate(2.0, rtol=1e-8, atol=1e-10)
-    assert names(run) == ["dop853", "rodas5p"] and run.methods[1].t < 0.2
+    assert names(run) == ["dop853", "rodas5p"] and run.method_history[1].t < 0.2
     assert run.message.startswith('stopped by event "down"')
     assert run.t[-1] == pytest.approx(exact.t[-1], abs=1e-5)
     assert {0.2, 0.3} <= set(run.t.tolist())
@@ -152,7 +152,7 @@ def test_slices_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = model.simulate(2.0, **options)
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     cut = model.simulate(2.0, **options)
-    assert equal(cut, whole) and cut.methods == whole.methods
+    assert equal(cut, whole) and cut.method_history == whole.method_history
     assert cut.statistics == whole.statistics
 
 
@@ -173,9 +173,9 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
         patch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
         patch.setattr(run_execution.RunMonitor, "look", look)
         part = model.simulate(2.0, checkpoint=path, **options)
-    assert part.status is None and (len(part.methods) == 1) == (at == 0.001)
+    assert part.status is None and (len(part.method_history) == 1) == (at == 0.001)
     rest = model.simulate(2.0, checkpoint=path, resume=True, **options)
-    assert equal(rest, whole) and rest.methods == whole.methods
+    assert equal(rest, whole) and rest.method_history == whole.method_history
     assert rest.statistics == whole.statistics
 
 
@@ -220,7 +220,10 @@ def test_where_implicit_steps_fail_the_run_goes_on_explicitly(
     model = compiled(scenes.bushed_rods(2, 1e8, 0.1))
     run = model.simulate(0.1, method="auto", **LOOSE)
     assert run.success and names(run) == ["dop853", "rodas4p2", "dop853"]
-    assert run.methods[2].why == "rodas4p2 found no step" and 0.02 < run.methods[2].t < 0.1
+    assert (
+        run.method_history[2].reason == "rodas4p2 found no step"
+        and 0.02 < run.method_history[2].t < 0.1
+    )
     exact = model.simulate(0.1, rtol=1e-8, atol=1e-10)
     assert run.q[-1] == pytest.approx(exact.q[-1], abs=1e-5)
 
@@ -234,7 +237,7 @@ def test_scenes_without_implicit_methods_stay_explicit(monkeypatch: pytest.Monke
     monkeypatch.setattr("mstmm.runtime.run.spectral_radius.TangentMatrix", refused)
     run = model.simulate(0.03, method="auto", **LOOSE)
     assert equal(run, plain) and names(run) == ["dop853", "dop853"]
-    assert run.methods[1].why == 'no implicit method: hinge "cam" has no derivatives'
+    assert run.method_history[1].reason == 'no implicit method: hinge "cam" has no derivatives'
 
 
 def test_trajectories_of_a_batch_choose_for_themselves() -> None:
@@ -253,7 +256,9 @@ def test_trajectories_of_a_batch_choose_for_themselves() -> None:
         assert same_bits(one.q, batch.q[i : i + 1])
         assert one.methods == batch.methods[i : i + 1]
         assert [stretch.method for stretch in batch.methods[i]] == names(run)
-        assert [stretch.why for stretch in batch.methods[i]] == [s.why for s in run.methods]
+        assert [stretch.reason for stretch in batch.methods[i]] == [
+            s.reason for s in run.method_history
+        ]
     plain = model.simulate_batch((q, u), t_end=0.01)
     assert plain.methods == ((), (), ())
 
@@ -261,9 +266,9 @@ def test_trajectories_of_a_batch_choose_for_themselves() -> None:
 def test_what_it_did_is_saved_with_the_result(tmp_path: Path) -> None:
     model = compiled(CASES["a10-1e8"].scene())
     run = model.simulate(0.2, method="auto", **LOOSE)
-    assert len(run.methods) == 2
+    assert len(run.method_history) == 2
     loaded = mstmm.load_result(run.save(tmp_path / "run.nc"))
-    assert loaded.methods == run.methods and loaded.settings.method == "auto"
+    assert loaded.method_history == run.method_history and loaded.settings.method == "auto"
     kept = json.loads(run.to_xarray().attrs["methods"])
     assert [row["method"] for row in kept] == names(run)
 
@@ -306,7 +311,7 @@ def test_a_run_without_a_method_is_changed_where_it_is_stiff() -> None:
 def test_a_run_without_a_method_that_is_not_stiff_is_one_by_dop853(options: dict[str, Any]) -> None:
     model = compiled(pins(2, [1.0, 0.5]))
     run, named = model.simulate(1.0, **options), model.simulate(1.0, "dop853", **options)
-    assert equal(run, named) and run.settings == named.settings and run.methods == ()
+    assert equal(run, named) and run.settings == named.settings and run.method_history == ()
     assert run.statistics == named.statistics and run.warnings == named.warnings
 
 
@@ -325,4 +330,4 @@ def test_a_run_without_a_method_is_resumed(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         model.simulate(2.0, **LOOSE, progress=stop, checkpoint=path)
     again = model.simulate(2.0, **LOOSE, checkpoint=path, resume=True)
-    assert equal(again, whole) and again.methods == whole.methods
+    assert equal(again, whole) and again.method_history == whole.method_history

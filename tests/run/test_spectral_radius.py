@@ -82,8 +82,8 @@ def test_a_beam_within_a_closed_loop() -> None:
     )
     rates = np.block([[0 * moved, np.eye(model.nq)], [by_q, by_u]])
     assert found == pytest.approx(np.abs(np.linalg.eigvals(rates)).max(), rel=0.1)
-    reached = model.simulate(0.02, error=1e-3).error_estimate
-    assert reached is not None and reached.met
+    reached = model.simulate(0.02, error=1e-3).achieved_error
+    assert reached is not None and reached.is_met
 
 
 def test_many_bodies_cost_no_more_columns() -> None:

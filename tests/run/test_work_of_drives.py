@@ -67,7 +67,7 @@ def test_a_drive_brings_no_doubt_of_the_energy(
     run = swing(law).simulate(3.0, method, rtol=1e-6, atol=1e-8)
     assert run.success
     assert run.certificate.energy.relative < 3e-6
-    assert not any("energy" in doubt for doubt in run.certificate.doubts)
+    assert not any("energy" in doubt for doubt in run.certificate.objections)
 
 
 def free() -> Model:
@@ -82,7 +82,7 @@ def test_a_motion_that_loses_energy_is_told(method: str) -> None:
     """Steps that are far too long, of a driven motion and of a free one."""
     for model, step in (swing((("damping", 0.03),)), 0.5), (free(), 0.1):
         run = model.simulate(3.0, method, step)
-        assert any("energy is not kept" in doubt for doubt in run.certificate.doubts)
+        assert any("energy is not kept" in doubt for doubt in run.certificate.objections)
 
 
 @pytest.mark.parametrize("method", FAMILY)
@@ -91,7 +91,7 @@ def test_speeds_that_are_wrong_are_told(method: str) -> None:
     u = run.u.copy()
     u[len(u) // 2 :, 1] *= 1.3  # the light one alone, whose energy is a thousandth
     spoilt = Result(run.model, replace(run.trajectory, u=u))
-    assert any("energy is not kept" in doubt for doubt in spoilt.certificate.doubts)
+    assert any("energy is not kept" in doubt for doubt in spoilt.certificate.objections)
 
 
 @pytest.mark.parametrize("method", ["genalpha", "hht", "newmark"])
@@ -102,4 +102,4 @@ def test_the_work_of_a_damper_in_fixed_steps(method: str) -> None:
              "outboard": "mass", "initial": {"q": [1.0]}, "law": law}  # fmt: skip
     scene = mstmm.Scene(gravity=(0, 0, 0), body=[{"name": "mass", "mass": 1.0}], hinge=[hinge])
     run = mstmm.compile(scene, engine="looped").simulate(100.0, method, 1.0)
-    assert run.work[-1] == pytest.approx(-run.energies()["springs"][0], rel=0.006)
+    assert run.work[-1] == pytest.approx(-run.energy_components()["springs"][0], rel=0.006)

@@ -42,15 +42,15 @@ def tree_of(data: Data) -> tuple[Scene, Topology]:
 
 def cut_of(data: Data) -> list[str]:
     scene, tree = tree_of(data)
-    return [scene.hinges.name(hinge) for hinge in tree.cut]
+    return [scene.hinges.name(hinge) for hinge in tree.cut_hinges]
 
 
 def test_a_hinge_that_holds_a_held_body_closes_the_loop() -> None:
     scene, tree = tree_of(four_bar())
     assert tree.plan is not None
-    assert len(tree.links) == 3 and len(tree.cut) == 1
-    assert scene.hinge[tree.cut[0]].outboard_body == "c"
-    assert {link.hinge for link in tree.links} | set(tree.cut) == {0, 1, 2, 3}
+    assert len(tree.links) == 3 and len(tree.cut_hinges) == 1
+    assert scene.hinge[tree.cut_hinges[0]].outboard_body == "c"
+    assert {link.hinge for link in tree.links} | set(tree.cut_hinges) == {0, 1, 2, 3}
     assert (tree.plan.rows, tree.plan.front) == (5, 5)
 
 
@@ -86,7 +86,7 @@ def test_members_of_a_chain_may_carry_what_closes_a_loop() -> None:
     )  # fmt: skip
     scene, tree = tree_of(data)
     assert tree.plan is not None
-    assert [scene.hinges.name(hinge) for hinge in tree.cut] == ["foot"]
+    assert [scene.hinges.name(hinge) for hinge in tree.cut_hinges] == ["foot"]
     passed = {scene.bodies.name(k) for k, groups in enumerate(tree.plan.pending) if groups}
     assert passed == {"rod1", "rod2", "seat", *(f"rope[{k}]" for k in range(4))}
     assert sorted(tree.order) == list(range(len(scene.bodies)))
@@ -131,7 +131,7 @@ def test_what_else_closes_is_counted_behind_the_hinges() -> None:
     assert tree.plan is not None
     groups = [(rows.count, sorted(set(rows.ends))) for rows in tree.plan.groups]
     assert groups[1:] == [(1, [-1, 0]), (1, [-1, 0, 2])]
-    assert tree.plan.cut_of == tree.cut
+    assert tree.plan.cut_of == tree.cut_hinges
 
 
 @pytest.mark.parametrize(

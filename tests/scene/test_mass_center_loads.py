@@ -92,8 +92,8 @@ def test_a_force_where_a_body_turns_about_has_a_warning(load: Tables, moves: boo
     found = [risk for risk in one.risks if risk.name == "idle-load"]
     assert len(found) == (not moves)
     for told in found:
-        assert told.means.startswith('load "push" acts at the pivot of "rod" (hinge "p")')
-        assert not told.doubt
+        assert told.description.startswith('load "push" acts at the pivot of "rod" (hinge "p")')
+        assert not told.invalidates
 
 
 @pytest.mark.parametrize(("on", "told"), [("rope[0]", 1), ("rope[1]", 0), ("rope[last].tip", 0)])

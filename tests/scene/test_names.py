@@ -41,8 +41,8 @@ def test_results_and_models_find_by_them(tmp_path: Path) -> None:
     run = model.simulate(0.3)
     saved = mstmm.load_result(run.save(tmp_path / "run.nc"))
     for one in (run, saved):
-        assert np.array_equal(one.coordinate("joint/1"), one.coordinate("joint_1"))
-        assert np.array_equal(one.speed("arm-1"), one.speed("joint_1"))
+        assert np.array_equal(one.coordinates("joint/1"), one.coordinates("joint_1"))
+        assert np.array_equal(one.speeds("arm-1"), one.speeds("joint_1"))
         assert np.array_equal(one.effort("joint/1"), one.effort("joint_1"))
         assert np.array_equal(one.force("joint/1"), one.force("joint_1"))
         for name in ("tool 0", "arm-1.tool", "a.b"):
@@ -53,8 +53,8 @@ def test_results_and_models_find_by_them(tmp_path: Path) -> None:
         moved = one.quantity("tool 0.x")
         assert moved.name == "tool 0.x"
         assert np.array_equal(moved.values, one.position("arm_1.tool")[:, 0])
-    assert model.layout.hinges["joint/1"] == model.layout.hinges["joint_1"]
-    assert list(model.layout.hinges) == ["joint_1"]
+    assert model.coordinate_layout.hinges["joint/1"] == model.coordinate_layout.hinges["joint_1"]
+    assert list(model.coordinate_layout.hinges) == ["joint_1"]
     q, u = run.q[-1], run.u[-1]
     poses = model.poses(q, ["arm-1", "tool 0", "ücke"])
     assert np.array_equal(poses, model.poses(q, ["arm_1", "arm_1.tool", "ground"]))
@@ -90,7 +90,7 @@ def test_one_number_by_two_names_is_refused() -> None:
 def test_a_hinge_that_others_call_as_the_scene_does_stays() -> None:
     plain = mstmm.compile(mstmm.Scene(**data(names={}))).simulate(0.1)
     run = mstmm.compile(mstmm.Scene(**data(names={"hinge": {"joint_1": "joint_1"}}))).simulate(0.1)
-    assert run.names() == plain.names()
+    assert run.quantity_names() == plain.quantity_names()
     assert np.array_equal(run.quantity("joint_1.angle").values, run.q[:, 0])
 
 
@@ -112,7 +112,7 @@ def test_names_of_members_of_chains_stay_their_own() -> None:
     chain = {"name": "rope", "count": 2, "inboard": "ground", **pattern}
     more = {"chain": [chain], "names": {"hinge": {"rope[0]": "joint_1"}}}
     run = mstmm.compile(mstmm.Scene(**data(**more))).simulate(0.1)
-    assert "rope[0].hinge.angle" in run.names()
+    assert "rope[0].hinge.angle" in run.quantity_names()
     assert run.quantity("rope[0].hinge.angle").values.any()
 
 
@@ -121,7 +121,7 @@ def test_a_name_of_the_scene_itself_goes_first() -> None:
     run = mstmm.compile(mstmm.Scene(**data(names=names))).simulate(0.1)
     assert np.array_equal(run.quantity("arm_1.x").values, run.position("arm_1")[:, 0])
     assert np.array_equal(run.quantity("arm_1.angle").values, run.q[:, 0])
-    assert np.array_equal(run.coordinate("arm_1"), run.coordinate("joint_1"))
+    assert np.array_equal(run.coordinates("arm_1"), run.coordinates("joint_1"))
 
 
 @pytest.mark.parametrize(

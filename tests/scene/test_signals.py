@@ -242,7 +242,7 @@ def test_inputs_and_signals_nobody_uses_are_told() -> None:
     for tables, element in (({"input": [{"name": "brake"}]}, 'input "brake"'),
                             ({"signal": [wind(), calm]}, 'signal "calm"')):  # fmt: skip
         (risk,) = Scene.from_data(motor("wind", **{"signal": [wind()]} | tables)).risks
-        assert (risk.name, risk.element, risk.doubt) == ("unused-input", element, False)
+        assert (risk.name, risk.element, risk.invalidates) == ("unused-input", element, False)
     followed = motor("brake", signal=[wind(), calm], input=[{"name": "brake", "value": "wind"}])
     assert Scene.from_data(followed).risks == ()
 

@@ -34,7 +34,7 @@ def knee(**changes: Any) -> dict[str, Any]:
 def test_a_user_type_is_kept_with_its_numbers() -> None:
     scene = Scene(**knee(initial={"q": [1, 2]}, law={"damping": [1, 2]}, axis=[1, 0, 0]))
     scene.check_types(KNOWN)
-    scene.check_against(KNEE)
+    scene.check_type(KNEE)
     joint = scene.hinge[0]
     assert joint.builtin is None
     assert joint.parameters == {"radius": 0.1}
@@ -143,9 +143,9 @@ def test_what_does_not_fit_in_a_chain(data: dict[str, Any], fragment: str) -> No
 
 def test_check_against_looks_at_its_own_type_only() -> None:
     scene = Scene(**knee(initial={"q": [1]}))
-    scene.check_against(FLYWHEEL)
+    scene.check_type(FLYWHEEL)
     with pytest.raises(SceneError, match=r'^scene: hinge "shoulder": initial\.q'):
-        scene.check_against(KNEE)
+        scene.check_type(KNEE)
 
 
 def test_keys_that_a_definition_does_not_read_are_refused() -> None:

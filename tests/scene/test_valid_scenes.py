@@ -371,6 +371,6 @@ def test_a_body_as_light_as_a_slip_of_units_is_warned_about() -> None:
     rod = {"mass": 1.0, "center_of_mass": [500, 0, 0], "inertia": [1.0, 84e3, 84e3]}
     rod = {"name": "rod1", **rod}
     (risk,) = Scene(**one() | {"body": [rod]}).risks
-    assert risk.name == "proportions" and "500 m with a mass of 1 kg" in risk.means
-    assert not risk.doubt
+    assert risk.name == "proportions" and "500 m with a mass of 1 kg" in risk.description
+    assert not risk.invalidates
     assert not Scene(**one() | {"body": [rod | {"mass": 500.0}]}).risks

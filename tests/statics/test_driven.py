@@ -38,11 +38,11 @@ def driven_four_bar() -> dict[str, Any]:
 def test_a_mechanism_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
     model = mstmm.compile(mstmm.Scene(**driven_four_bar()), engine="looped")
     found = model.equilibrium(t=0.05)
-    crank, knee, rocker = (float(found[model.layout.hinges[name].q]) for name in "abc")
+    crank, knee, rocker = (float(found[model.coordinate_layout.hinges[name].q]) for name in "abc")
     coupler = 0.1 * np.exp(1j * crank) + 0.25 * np.exp(1j * (crank + knee))
     assert abs(crank - 0.3) < 1e-12
     assert abs(coupler - 0.2 - 0.25 * np.exp(1j * rocker)) < 1e-9
-    assert found.residuals == {} and found.unstable == () and found.trusted
+    assert found.residuals == {} and found.unstable_speeds == () and found.trusted
 
 
 def test_a_tree_whose_drives_leave_nothing_free_is_where_they_have_it() -> None:
@@ -68,7 +68,7 @@ def test_an_offset_of_rounding_is_no_length_and_no_unbalance(inertia: list[float
     for offset in (1e-12, 1e-9, 1e-7):
         found = carried(offset, inertia).equilibrium()
         assert abs(found[0] + 3 * GRAVITY / 1000) < 1e-12
-        assert found.unstable == () and found.trusted
+        assert found.unstable_speeds == () and found.trusted
 
 
 @pytest.mark.parametrize("inertia", [0.0, 1e-3, 1.0])

@@ -100,7 +100,7 @@ def test_a_prism_of_struts_and_cables_is_found(gravity: float, pulls_only: bool)
         assert abs(top - radius * np.exp(1j * turn)) < 1e-6
         if not gravity:
             assert abs(np.angle(top) - 5 * np.pi / 6) < 1e-8
-    assert found.unstable == () and found.trusted
+    assert found.unstable_speeds == () and found.trusted
     assert [risk.name for risk in found.risks] == ["free-spin"]
 
 
@@ -133,7 +133,7 @@ def test_a_net_of_cables_is_found(count: int, rest: float) -> None:
     scene, pairs = net(count, rest)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
     found = model.equilibrium()
-    hinges = model.layout.hinges
+    hinges = model.coordinate_layout.hinges
     places = {(i, j): found[hinges[f"h{i}_{j}"].q :][:3] for i in range(1, count + 1)
               for j in range(1, count + 1)}  # fmt: skip
     rows = {node: 3 * number for number, node in enumerate(places)}
@@ -155,7 +155,7 @@ def test_a_net_of_cables_is_found(count: int, rest: float) -> None:
                 stiffness[own, rows[beside] : rows[beside] + 3] -= block
     assert np.abs(forces).max() < 1e-9
     assert np.linalg.eigvalsh(stiffness).min() > 1e-3
-    assert found.unstable == () and found.trusted
+    assert found.unstable_speeds == () and found.trusted
 
 
 def test_a_soft_motion_beside_a_stiff_one_is_determined() -> None:
@@ -172,4 +172,4 @@ def test_a_soft_motion_beside_a_stiff_one_is_determined() -> None:
     ), engine="looped")  # fmt: skip
     found = model.equilibrium()
     assert found[0] == pytest.approx(-1.001 * GRAVITY / 1e9, rel=1e-9)
-    assert abs(found[1]) < 1e-9 and found.unstable == ()
+    assert abs(found[1]) < 1e-9 and found.unstable_speeds == ()

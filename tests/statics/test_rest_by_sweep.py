@@ -61,7 +61,7 @@ def test_a_cantilever_bends_as_its_moments_say() -> None:
     found = model.equilibrium()
     assert np.abs(found - expected).max() < 1e-9
     assert max(map(abs, found.residuals.values())) < 1e-8
-    assert not found.unstable
+    assert not found.unstable_speeds
 
 
 def test_rest_that_does_not_last_is_left_or_told() -> None:
@@ -72,7 +72,7 @@ def test_rest_that_does_not_last_is_left_or_told() -> None:
     assert np.abs(turns - np.round(turns)).max() < 1e-9
     found = model.equilibrium(upright)
     assert np.abs(found - upright).max() < 1e-9
-    assert "pin0.angle_rate" in found.unstable
+    assert "pin0.angle_rate" in found.unstable_speeds
     assert "unstable" in {risk.name for risk in found.risks}
 
 

@@ -72,18 +72,18 @@ def test_nothing_goes_by_the_name(name: str) -> None:
     models = [mstmm.compile(one, engine="looped") for one in made.values()]
     ours, theirs = models
     assert ours.scene.warnings == said(theirs.scene.warnings)
-    for body in ours.flexible:
-        one, other = ours.flexible[body], theirs.flexible[body]
+    for body in ours.flexible_bodies:
+        one, other = ours.flexible_bodies[body], theirs.flexible_bodies[body]
         assert (one.frame, one.modes, one.notes) == (other.frame, other.modes, said(other.notes))
         assert one.K.tobytes() == other.K.tobytes() and one.C.tobytes() == other.C.tobytes()
-    links = [[body.link for body in model.packed.system.distinct] for model in models]
+    links = [[body.link for body in model.packed_scene.system.distinct] for model in models]
     assert links[0] == links[1]
-    first, second = (structure_of(model.packed.system, model.known or {}) for model in models)
+    first, second = (structure_of(model.packed_scene.system, model.known or {}) for model in models)
     assert first[0] == second[0] and first[1].tobytes() == second[1].tobytes()
-    assert ours.layout.q_names == theirs.layout.q_names
+    assert ours.coordinate_layout.q_names == theirs.coordinate_layout.q_names
     assert ours.parameters.keys() - theirs.parameters.keys() == set()
     runs = [model.simulate(0.01, method="rk4", step=5e-5) for model in models]
     assert runs[0].success and np.isfinite(runs[0].q).all()
     assert runs[0].q.tobytes() == runs[1].q.tobytes()
-    assert runs[0].names() == runs[1].names()
+    assert runs[0].quantity_names() == runs[1].quantity_names()
     assert runs[0].certificate.warnings == said(runs[1].certificate.warnings)

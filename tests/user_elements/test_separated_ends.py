@@ -60,7 +60,7 @@ def test_a_raised_pin_leaves_the_plane() -> None:
         pin = {"name": "pin", "type": "pin", "inboard": "ground", "outboard": "rod"}
         joint = {"name": "joint", "inboard": "rod.tip", "outboard": "blade", **hinge}
         scene = mstmm.Scene(gravity=[0, -9.81, 0], body=[ROD], beam=[blade], hinge=[pin, joint])
-        return mstmm.compile(scene).flexible["blade"].modes
+        return mstmm.compile(scene).flexible_bodies["blade"].modes
 
     assert not any(mode.startswith("z") for mode in shapes({"type": "pin"}))
     raised = {"type": "raised_pin", "parameters": {"height": 0.3}}

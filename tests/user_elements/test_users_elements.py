@@ -63,9 +63,9 @@ def generated(name: str, folder: Path) -> str:
     shutil.copy(DEFINITIONS / f"{name}.py", path)
     begin = time.perf_counter()
     (made,) = mstmm.generate_file(path)
-    print(f"{name}: {made.how} after {time.perf_counter() - begin:.2f} s")
+    print(f"{name}: {made.execution} after {time.perf_counter() - begin:.2f} s")
     assert made.spec.name == name
-    return made.how
+    return made.execution
 
 
 def scene(hinge: dict[str, Any], **more: Any) -> mstmm.Scene:

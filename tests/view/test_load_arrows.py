@@ -35,7 +35,7 @@ def run() -> Result:
 
 
 def test_loads_are_quantities(run: Result) -> None:
-    angle = run.coordinate("pin")[:, 0]
+    angle = run.coordinates("pin")[:, 0]
     along, across = 1 + run.t, 2.0
     expected = np.stack([
         along * np.cos(angle) - across * np.sin(angle),

@@ -82,7 +82,7 @@ def test_everything_is_one_bundle_of_its_formats(name: str) -> None:
 
 def test_bundles_say_what_the_pages_say() -> None:
     certificate = scenes.run().certificate
-    assert certificate._repr_mimebundle_()["text/plain"] == certificate.text()
+    assert certificate._repr_mimebundle_()["text/plain"] == certificate.as_text()
     spring = mstmm.equations("spring")
     shown = element("spring")._repr_mimebundle_()
     assert shown["text/plain"] == "<Spring: spring-damper-actuator>"

@@ -165,12 +165,12 @@ def test_an_elastic_body_is_seen_by_its_mesh() -> None:
     a, b, c = np.moveaxis(seen.vertices[0][seen.faces], 1, 0)
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(0.5 * 0.04**2)
     assert np.ptp(seen.vertices[0], axis=0) == pytest.approx([0.5, 0.04, 0.04])
-    skin = model.flexible["link"].skin
+    skin = model.flexible_bodies["link"].skin
     assert skin is not None
     bent = seen.vertices - run.position("link")[:, None]
     bent = np.einsum("fji,fnj->fni", stage.poses["bodies/link"].rotation(), bent) - skin.nodes
     assert np.abs(bent[-1]).max() > 1e-3
-    sum_of_shapes = np.einsum("cNn,fn->fNc", skin.phi, run.coordinate("link"))
+    sum_of_shapes = np.einsum("cNn,fn->fNc", skin.phi, run.coordinates("link"))
     assert bent == pytest.approx(sum_of_shapes, abs=1e-12)
     corners = skin.nodes[:, 0] > 0.4999
     corners &= (np.abs(np.abs(skin.nodes[:, 1:] - 0.02) - 0.02) < 1e-9).all(axis=1)

@@ -285,7 +285,7 @@ def simulate(
             result = save_result(plan, result, seconds, progress)
     if plan.plot is not None:
         result.plot(*plan.quantities, path=plan.plot, title=Path(plan.scene).stem)
-    report_run(plan, result, seconds + result.trajectory.before, json, rejection)
+    report_run(plan, result, seconds + result.trajectory.start_findings, json, rejection)
     if was_interrupted(result):
         raise typer.Exit(130)
     if not result.success:
@@ -312,7 +312,7 @@ def _compile_model(plan: RunOptions) -> Model:
     model = compile_file(plan.scene, scene, plan.sweep, plan.engine, level, simplifications)
     if plan.quantities:
         start_result = model.simulate(t_end=0.0, method="dop853")
-        pictures = start_result.pictures()
+        pictures = start_result.picture_names()
         for name in plan.quantities:
             try:
                 if name not in pictures:

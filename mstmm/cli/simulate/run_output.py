@@ -62,7 +62,7 @@ def _print_report(plan: RunOptions, result: Result, seconds: float, made: list[s
     from .. import run_summary, terminal_output
 
     console = terminal_output.table_console()
-    verdict, has_reasons = _plan_verdict(plan, result), result.trajectory.told
+    verdict, has_reasons = _plan_verdict(plan, result), result.trajectory.reported_risks
     for line in run_summary.verdict_lines(verdict, console.width, has_reasons):
         terminal_output.print_lines(line)
     terminal_output.print_lines(

@@ -156,7 +156,7 @@ def _print_chart(made: Chart, files: list[str]) -> None:
             console.print(terminal_output.build_table(title, columns, rows))
             terminal_output.print_lines()
     for refused, word in ((True, "does not apply"), (False, "left out")):
-        for text in skip_reasons(made.left_out, refused, _MAX_NAMED):
+        for text in skip_reasons(made.skipped, refused, _MAX_NAMED):
             terminal_output.print_lines(f"{word}: {text}")
     if missing_packages("plot"):
         terminal_output.print_lines(

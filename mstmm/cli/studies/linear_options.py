@@ -88,7 +88,7 @@ class LinearOptions:
         if self.seen is not None:
             modes.view(self.seen, title=title_from_path(Path(self.scene)))
 
-    def answered(self, answer: Linear | Modes | FrequencyResponse) -> bool:
+    def write_answer(self, answer: Linear | Modes | FrequencyResponse) -> bool:
         """Write the files, and with --json print the answer; True if it has been printed."""
         from .. import terminal_output as terminal
 

@@ -80,7 +80,7 @@ class Topology:
     carried: Mapping[int, int] = field(default_factory=dict)
 
     @property
-    def cut(self) -> tuple[int, ...]:
+    def cut_hinges(self) -> tuple[int, ...]:
         """Indices of the scene's hinges that are not part of the tree."""
         return () if self.plan is None else self.plan.cut
 
@@ -188,7 +188,7 @@ def inboard_hinges_by_body(scene: SceneTables) -> dict[str, Hinge]:
     """Inboard hinge in the tree by body name, of a scene that has a tree."""
     skeleton = scene.skeleton
     loops = len(skeleton.hinge) > len(skeleton.body)  # every body has at least one
-    cut = set(build_topology(skeleton).cut) if loops else set()
+    cut = set(build_topology(skeleton).cut_hinges) if loops else set()
     return {
         hinge.outboard_body: hinge for number, hinge in enumerate(scene.hinge) if number not in cut
     }

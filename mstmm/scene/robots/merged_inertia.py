@@ -20,7 +20,7 @@ def merge_inertia(parts: Sequence[tuple[Link, Pose]]) -> tuple[float, Vector, Ma
         link = parts[0][0]
         return link.mass, link.center, link.inertia
     mass = sum(link.mass for link, _ in parts)
-    mass_centres = [pose.then(Pose(link.center)).position for link, pose in parts]
+    mass_centres = [pose.compose(Pose(link.center)).position for link, pose in parts]
     center = ZERO
     if mass > 0:
         x, y, z = (

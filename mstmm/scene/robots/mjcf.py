@@ -121,7 +121,7 @@ class _MjcfReader:
         parent = int(m.body_parentid[body])
         holder = self._link_of(parent)
         body_pose = Pose(_vector(m.body_pos[body]), _rotation(m.body_quat[body]))
-        pose, previous_anchor = self._frame[parent].then(body_pose), ZERO
+        pose, previous_anchor = self._frame[parent].compose(body_pose), ZERO
         if count == 0:
             self._frame[body] = IDENTITY_POSE
             weld_joint = Joint(
@@ -140,11 +140,11 @@ class _MjcfReader:
             joint_pose = (
                 IDENTITY_POSE
                 if joint_type == _FREE
-                else pose.then(Pose(_subtract(joint_anchor, previous_anchor)))
+                else pose.compose(Pose(_subtract(joint_anchor, previous_anchor)))
             )
             joint = self._name("joint", number)
             link_name = name if is_last else f"{name}/{joint}"
-            joint_pose = joint_pose.then(self._back(number, joint_type))
+            joint_pose = joint_pose.compose(self._back(number, joint_type))
             if is_last:
                 self._frame[body] = Pose(_subtract(ZERO, joint_anchor))
             where = self._at("joint", joint, "freejoint")
@@ -173,7 +173,7 @@ class _MjcfReader:
         a, b, c = map(float, m.body_inertia[body])
         principal: Matrix = ((a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c))
         inertia = product(product(turn, principal), transpose(turn))
-        center = frame.then(Pose(_vector(m.body_ipos[body]))).position
+        center = frame.compose(Pose(_vector(m.body_ipos[body]))).position
         return Link(name, mass, center, inertia if any((a, b, c)) else NOTHING, where)
 
     def _back(self, number: int, kind: int) -> Pose:
@@ -292,7 +292,7 @@ class _MjcfReader:
             body = int(m.geom_bodyid[number])
             geom_pose = Pose(_vector(m.geom_pos[number]), _rotation(m.geom_quat[number]))
             keys["color"] = color(m.geom_rgba[number][:3])
-            yield Visual(self._link_of(body), self._frame[body].then(geom_pose), keys)
+            yield Visual(self._link_of(body), self._frame[body].compose(geom_pose), keys)
         if undrawn_count:
             self._tell(
                 "geom", f"{undrawn_count} of them are not drawn (meshes, ellipsoids, heights)"

@@ -151,7 +151,7 @@ class _SceneReader:
     def _in_link(self, body: str, pose: Pose) -> Pose:
         """Convert a frame of a body to the axes of its link."""
         frame = self.frames[body]
-        return pose if frame == IDENTITY_POSE else frame.inverse.then(pose)
+        return pose if frame == IDENTITY_POSE else frame.inverse.compose(pose)
 
     def _link(self, body: Body) -> Link:
         frame, inertia = self.frames[body.name], body.inertia_matrix
@@ -177,10 +177,12 @@ class _SceneReader:
     def _joint(self, hinge: Hinge) -> Joint:
         hinge_pose = Pose(rotation=hinge.rotation)
         if hinge.inboard_body == GROUND:
-            pose = Pose(hinge.position).then(hinge_pose)
+            pose = Pose(hinge.position).compose(hinge_pose)
         else:
             holder = self.bodies[hinge.inboard_body]
-            pose = self._in_link(holder.name, _end_pose(holder, hinge.inboard_end)).then(hinge_pose)
+            pose = self._in_link(holder.name, _end_pose(holder, hinge.inboard_end)).compose(
+                hinge_pose
+            )
         self._tell_hinge(hinge)
         parent, child = map(self._link_name, (hinge.inboard_body, hinge.outboard_body))
         return Joint(
@@ -236,7 +238,7 @@ class _SceneReader:
         body, _, end = shape.on.partition(".")
         if body == GROUND:
             return Visual(self.world, pose, keys)
-        link_pose = self._in_link(body, _end_pose(self.bodies[body], end)).then(pose)
+        link_pose = self._in_link(body, _end_pose(self.bodies[body], end)).compose(pose)
         return Visual(self._link_name(body), link_pose, keys)
 
     def _tell_rest(self) -> None:
@@ -278,7 +280,7 @@ def _check_supported(scene: Scene) -> None:
                 f'hinge "{hinge.name}": URDF has no joint like a {hinge.type} hinge; use pins '
                 "and slides in series, with massless bodies between them"
             )
-    if cut := [scene.hinge[number] for number in build_topology(scene).cut]:
+    if cut := [scene.hinge[number] for number in build_topology(scene).cut_hinges]:
         raise SceneError(_loop_message(scene, cut))
 
 

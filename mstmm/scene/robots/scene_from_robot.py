@@ -46,7 +46,7 @@ class ImportOptions:
 
     base: str = FIXED
     merge: bool = True
-    stops: float | None = None
+    stop_stiffness: float | None = None
     mimics: str = COUPLED
 
 
@@ -221,7 +221,7 @@ class _SceneWriter:
             return (_GROUND_OWNER if grounded else link.name), IDENTITY_POSE
         if self.choices.merge and (joint.type == FIXED or joint.name in self.held):
             owner, pose = self.place[joint.parent]
-            return owner, pose.then(joint.pose)
+            return owner, pose.compose(joint.pose)
         return link.name, IDENTITY_POSE
 
     def _frame(self, link: Link) -> str:
@@ -278,7 +278,7 @@ class _SceneWriter:
             joint = self.tree.joints[name]
             is_held = joint.name in self.held
             owner, frame = self.place[joint.parent]
-            pose, grounded = frame.then(joint.pose), owner == _GROUND_OWNER
+            pose, grounded = frame.compose(joint.pose), owner == _GROUND_OWNER
             yield {
                 "name": hinge,
                 "type": FIXED if is_held else joint.type,
@@ -294,14 +294,14 @@ class _SceneWriter:
         if mass := keys.pop("armature", 0.0):
             law["effort"] = _inertial_mass_efforts(self.joints[joint.name], mass)
         if limits := law.pop("limits", None):
-            if self.choices.stops is None:
+            if self.choices.stop_stiffness is None:
                 self._tell(
                     joint,
                     f"joint {joint.name!r}",
                     "its limits are not stops; they are kept as rated",
                 )
             else:
-                law["limits"] = {**limits, "stiffness": self.choices.stops}
+                law["limits"] = {**limits, "stiffness": self.choices.stop_stiffness}
         if law:
             keys["law"] = law
         if start is not None and not self._is_coupled(joint.name):
@@ -375,7 +375,7 @@ class _SceneWriter:
         meshes = None if folder is None else MeshFinder(folder)
         for visual in self.robot.looks:
             owner, frame = self.place[visual.link]
-            pose, keys = frame.then(visual.pose), dict(visual.keys)
+            pose, keys = frame.compose(visual.pose), dict(visual.keys)
             if file := keys.get("file"):
                 mesh_path = None if meshes is None else meshes.path(file)
                 if mesh_path is None:

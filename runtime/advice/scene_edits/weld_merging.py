@@ -148,7 +148,7 @@ def _removable_body(
     weld: Hinge, bodies: Mapping[str, Body], scene: Scene, referenced: ReferencedParts
 ) -> str | None:
     """Body of a weld that can become part of the other one; None if neither can."""
-    if not weld.is_weld or weld.lets_go or weld.name in referenced.hinges:
+    if not weld.is_weld or weld.is_released or weld.name in referenced.hinges:
         return None
     pair = (weld.outboard_body, weld.inboard_body)
     if any(name != GROUND and not _is_rigid(bodies.get(name)) for name in pair):
@@ -208,7 +208,7 @@ def _remove_weld(
     if removed != weld.outboard_body:
         pose = pose.inverse
     poses = {removed: pose} | {
-        f"{removed}.{end}": pose.then(end_pose(part, end)) for end in part.ends
+        f"{removed}.{end}": pose.compose(end_pose(part, end)) for end in part.ends
     }
     scene = with_tables(
         merged.scene, hinge=tuple(hinge for hinge in merged.scene.hinge if hinge.name != weld.name)
@@ -308,7 +308,7 @@ def _attached_to_ground(element: Any, rotation: Matrix, poses: Mapping[str, Pose
     return element.model_copy(
         update={
             "inboard": GROUND, "position": pose.position,
-            "orientation": to_orientation(pose.then(Pose(ZERO, rotation))),
+            "orientation": to_orientation(pose.compose(Pose(ZERO, rotation))),
         }
     )  # fmt: skip
 

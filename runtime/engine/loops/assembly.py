@@ -82,7 +82,7 @@ class Assembly:
         self.held, self._behind = tuple(hinges), behind
         self.calls = LoopCalls(engine_with_held(engine, hinges), q, t=t)
         if self.calls.engine is not engine:
-            self.calls.judge_by([q])
+            self.calls.set_pivot_reference([q])
         self._weights = self._weighted()
         #: 1 for speeds that are neither fixed nor driven, else 0.
         self.free = self._free_speeds()

@@ -83,7 +83,7 @@ class RequestedCoordinates:
         slots, facts = self.packed.layout.hinges[hinge.name], hinge.facts
         if slots.quaternion is not None:
             self._fours += [slots.q + slots.quaternion] * counts
-        elif facts is not None and slots.straight:
+        elif facts is not None and slots.rates_are_speeds:
             for k in range(slots.nq):
                 is_sliding = k in facts.slides
                 self.turning += [slots.q + k] * (not is_sliding)

@@ -52,9 +52,9 @@ class IndependentSpeeds:
     @cached_property
     def places(self) -> tuple[int, ...]:
         """Indices of the independent speeds, chosen at the initial state."""
-        return self.chosen(self._start)
+        return self.select(self._start)
 
-    def chosen(self, q: Array) -> tuple[int, ...]:
+    def select(self, q: Array) -> tuple[int, ...]:
         """Choose the indices of speeds that determine all others at q (nq,).
 
         Each is the first in the scene that distinguishes the remaining motions, in characteristic
@@ -132,7 +132,7 @@ class IndependentSpeeds:
             else np.full_like(motion, np.nan)
         )
 
-    def moved(self, q: Array, speeds: Array) -> Array:
+    def move(self, q: Array, speeds: Array) -> Array:
         """Move q (nq,) by a small step along speeds (nu,); loops close to first order."""
         return self._calls.moved(q, speeds)
 

@@ -59,62 +59,66 @@ class LoopAnalysis:
     """Closed-loop analysis of a scene: cut hinges, rows, rank, redundancy and mobility.
 
     Attributes:
-        cut: hinges that close loops; the choice within a loop affects only the computing time.
-        rows: (hinge, direction) of every row, in the order in which they are closed: "x" to "mz"
-            for the outboard axis of the hinge nearest to its direction, "u1", ... for its own
-            speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
+        cut_hinges: hinges that close loops; the choice within a loop affects only the computing
+            time.
+        constraint_rows: (hinge, direction) of every row, in the order in which they are closed: "x"
+            to "mz" for the outboard axis of the hinge nearest to its direction, "u1", ... for its
+            own speeds; or (constraint, direction): "length", "normal", "x" and "y" of rolling,
             "across1" and "across2" of a curve.
         rank: number of independent rows.
-        nearby: rank in closed states nearby; greater than `rank` in a singular pose.
-        redundant: redundant rows; the loads along them are indeterminate.
-        momentary: rows of `redundant` that are redundant only in this pose.
-        not_unique: indeterminate loads by name: components of hinge loads, "fx" to "mz" along and
-            about the outboard axes, and directions of the loads of constraints and couplings.
-            Rigid bodies do not determine them: results show one of many distributions.
-        misfit: largest position gap (m, rad) at the start of rows that are redundant up to a
-            misfit, with the row; 0 and two empty strings if there is none.
+        generic_rank: rank in closed states nearby; greater than `rank` in a singular pose.
+        redundant_rows: redundant rows; the loads along them are indeterminate.
+        redundant_in_this_pose: rows of `redundant_rows` that are redundant only in this pose.
+        indeterminate_reactions: indeterminate loads by name: components of hinge loads, "fx" to
+            "mz" along and about the outboard axes, and directions of the loads of constraints and
+            couplings. Rigid bodies do not determine them: results show one of many distributions.
+        redundancy_gap: largest position gap (m, rad) at the start of rows that are redundant up to
+            a misfit, with the row; 0 and two empty strings if there is none.
         mobility: number of degrees of freedom.
-        shapes: number of these that are rates of the shapes of flexible bodies: all of them unless
-            some are needed to satisfy rows.
-        width: largest number of rows that are open across one hinge at a time.
+        flexible_mobility: number of these that are rates of the shapes of flexible bodies: all of
+            them unless some are needed to satisfy rows.
+        max_open_rows: largest number of rows that are open across one hinge at a time.
     """
 
-    cut: tuple[str, ...] = ()
-    rows: tuple[tuple[str, str], ...] = ()
+    cut_hinges: tuple[str, ...] = ()
+    constraint_rows: tuple[tuple[str, str], ...] = ()
     rank: int = 0
-    nearby: int = 0
-    redundant: tuple[tuple[str, str], ...] = ()
-    momentary: tuple[tuple[str, str], ...] = ()
+    generic_rank: int = 0
+    redundant_rows: tuple[tuple[str, str], ...] = ()
+    redundant_in_this_pose: tuple[tuple[str, str], ...] = ()
     mobility: int = 0
-    width: int = 0
-    not_unique: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    misfit: tuple[float, str, str] = (0.0, "", "")
-    shapes: int = 0
+    max_open_rows: int = 0
+    indeterminate_reactions: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    redundancy_gap: tuple[float, str, str] = (0.0, "", "")
+    flexible_mobility: int = 0
     found_by: Callable[[], tuple[Branch, ...]] = field(default=tuple, repr=False, compare=False)
-    decided_by: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
+    speed_choice: Callable[[], tuple[str, ...]] = field(default=tuple, repr=False, compare=False)
 
     @property
     def singular(self) -> bool:
         """True if the start is a singular configuration, with lower rank than states nearby."""
-        return self.nearby > self.rank
+        return self.generic_rank > self.rank
 
     @property
-    def counted(self) -> str:
+    def summary(self) -> str:
         """Summary of rows, rank and mobility."""
-        shapes_text = f", of them {self.shapes} of shapes" if self.shapes else ""
+        shapes_text = (
+            f", of them {self.flexible_mobility} of shapes" if self.flexible_mobility else ""
+        )
         speeds_text = "1 speed" if self.mobility == 1 else f"{self.mobility} speeds"
-        return f"{self.rank} of {len(self.rows)} rows count, {speeds_text} left{shapes_text}"
+        return f"{self.rank} of {len(self.constraint_rows)} rows count, {speeds_text} "
+        f"left{shapes_text}"
 
-    def repeated(self, most: int) -> str:
+    def redundant_text(self, most: int) -> str:
         """Text of `redundant` for messages, with at most `most` names."""
-        row_names = ", ".join(f"{word} of {name}" for name, word in self.redundant[:most])
-        return row_names + (" ..." if len(self.redundant) > most else "")
+        row_names = ", ".join(f"{word} of {name}" for name, word in self.redundant_rows[:most])
+        return row_names + (" ..." if len(self.redundant_rows) > most else "")
 
     @property
-    def open_loads(self) -> str:
+    def indeterminate_text(self) -> str:
         """Text of `not_unique` for messages, with the first names only."""
         names_by_components: dict[tuple[str, ...], list[str]] = {}
-        for name, components in self.not_unique.items():
+        for name, components in self.indeterminate_reactions.items():
             names_by_components.setdefault(components, []).append(name)
         return "; ".join(
             f"{' '.join(components)} of "
@@ -131,12 +135,12 @@ class LoopAnalysis:
         return self.found_by()
 
     @property
-    def independent(self) -> tuple[str, ...]:
+    def independent_speeds(self) -> tuple[str, ...]:
         """Names of the independent speeds; their number is the mobility.
 
         They determine all others; mass matrices and linear models of the mechanism refer to them.
         """
-        return self.decided_by()
+        return self.speed_choice()
 
 
 class LoopStart:
@@ -192,7 +196,7 @@ class LoopStart:
         self._refuse_structure()
         self.start = self._assembly(near, holds).positions(near), u
         try:
-            self.start = self.assembled(near, u, holds, self.fast)
+            self.start = self.assemble(near, u, holds, self.fast)
         except SceneError:
             self._refuse_locked(calls, redundant_names, locking_gap)
             raise
@@ -255,7 +259,7 @@ class LoopStart:
             q = self._assembly(next_q, {*holds, *driven}, t).positions(next_q)
         return q
 
-    def assembled(
+    def assemble(
         self, q: Array, u: Array, holds: Collection[str], fast: Collection[str], t: float = 0.0
     ) -> tuple[Array, Array]:
         """Nearest (q, u) that satisfies all constraints at t (s).
@@ -330,7 +334,7 @@ class LoopStart:
             calls = LoopCalls(self.engine, q)
             records = calls.records
         rounding_rows, redundant_names = (
-            calls.judge_by(rank.states),
+            calls.set_pivot_reference(rank.states),
             {names[row] for row in rank.here},
         )
         packed = self.engine.packed
@@ -344,7 +348,7 @@ class LoopStart:
             tuple(names), independent_count, len(imposed_rows) - rank.nearby,
             tuple(names[row] for row in sorted(rank.here)),
             tuple(names[row] for row in sorted(rank.here - rank.always)),
-            mobility, records.width, load_names, shapes=min(mobility, modal_speed_count),
+            mobility, records.width, load_names, flexible_mobility=min(mobility, modal_speed_count),
         )  # fmt: skip
         return analysis, {row: names[row] for row in sorted(rank.always)}
 
@@ -372,7 +376,8 @@ class LoopStart:
         remedy = remedy or "use a hinge with more coordinates, or replace a hinge by a [[spring]]"
         raise SceneError(
             f"scene: no degree of freedom is left, and "
-            f"{_closing_elements_text(name for name, _ in self.loops.rows)}: a structure; {remedy}"
+            f"{_closing_elements_text(name for name, _ in self.loops.constraint_rows)}: a "
+            f"structure; {remedy}"
         )
 
     def _refuse_drowned(self, rows: Sequence[tuple[str, str]]) -> None:
@@ -402,7 +407,9 @@ class LoopStart:
         gaps[coupling_rows] = np.maximum(gaps, velocity_errors)[coupling_rows]
         worst_row = max(repeating, key=lambda row: float(gaps[row]), default=None)
         if worst_row is not None and gaps[worst_row] > much * NEGLIGIBLE_MISFIT:
-            self.loops = replace(self.loops, misfit=(float(gaps[worst_row]), *repeating[worst_row]))
+            self.loops = replace(
+                self.loops, redundancy_gap=(float(gaps[worst_row]), *repeating[worst_row])
+            )
         for row, (closing, direction) in repeating.items():
             if gaps[row] > much:
                 if direction in _COUPLING_ROWS:

@@ -66,7 +66,7 @@ class LoopCalls(LoopWorkspace):
             engine.pointer(self.memory), engine.pointer(change), engine.pointer(errors), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, t, q, u)
+            raise engine.evaluation_error(failure, t, q, u)
         return change, errors[: self.count]
 
     def choose(self, q: Array) -> bool:
@@ -81,7 +81,7 @@ class LoopCalls(LoopWorkspace):
             is_changed, failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, self.t, q, np.zeros(engine.nu))
+            raise engine.evaluation_error(failure, self.t, q, np.zeros(engine.nu))
         return bool(is_changed[0])
 
     def resting(self) -> NDArray[np.bool_]:
@@ -93,7 +93,7 @@ class LoopCalls(LoopWorkspace):
         releases = (int(self.model.rows[row].release) for row in range(self.count))
         return [row for row, place in enumerate(releases) if place >= 0 and self.memory[place]]
 
-    def stressed(self, q: Array, asked: Array, give: float) -> Array:
+    def solve_multipliers(self, q: Array, asked: Array, give: float) -> Array:
         """Multipliers (rows,) of rows with errors `asked` and compliance `give`; see sweep.h."""
         engine, multipliers = self.engine, np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
@@ -102,7 +102,7 @@ class LoopCalls(LoopWorkspace):
             engine.pointer(self.memory), engine.pointer(multipliers), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, 0.0, q, np.zeros(engine.nu))
+            raise engine.evaluation_error(failure, 0.0, q, np.zeros(engine.nu))
         return multipliers[: self.count]
 
     def moved(self, q: Array, change: Array) -> Array:
@@ -115,7 +115,7 @@ class LoopCalls(LoopWorkspace):
             engine.ffi.from_buffer("int[]", self._quaternions), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, t, q, change)
+            raise engine.evaluation_error(failure, t, q, change)
         return q_moved
 
     def driven(self, q: Array, u: Array) -> tuple[Array, Array]:
@@ -127,10 +127,10 @@ class LoopCalls(LoopWorkspace):
             engine.pointer(self.memory), failure,
         )  # fmt: skip
         if code:
-            raise engine.failed(failure, t, q, u)
+            raise engine.evaluation_error(failure, t, q, u)
         return q, u
 
-    def judge_by(self, states: Sequence[Array]) -> set[int]:
+    def set_pivot_reference(self, states: Sequence[Array]) -> set[int]:
         """Set the reference for pivots far below their mobilities from closed states (nq,).
 
         Such rows are independent, with heavy bodies outboard of them; their reference is the

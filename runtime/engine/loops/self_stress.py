@@ -82,7 +82,7 @@ def _loaded_components(
         is_imposed * np.random.default_rng(seed).normal(size=calls.count) / np.sqrt(calls.mobility)
     )
     for _ in range(_REPETITIONS):
-        multipliers = is_imposed * calls.stressed(
+        multipliers = is_imposed * calls.solve_multipliers(
             q, _COMPLIANCE * calls.mobility * multipliers, _COMPLIANCE
         )
     return tuple(

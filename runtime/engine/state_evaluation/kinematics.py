@@ -58,7 +58,7 @@ class Kinematics:
         self, engine: LoopedEngine, fusion: FusedCode, references: BodyReferences,
         brackets: Callable[[], Brackets | None],
     ) -> None:  # fmt: skip
-        self._engine, self._fusion, self._references = engine.inertia_alone, fusion, references
+        self._engine, self._fusion, self._references = engine.inertia_only, fusion, references
         self._brackets, self._bends = brackets, bool(engine.packed.layout.modal)
         self._known = dict[Names, list[Probe]]()
         self._records = dict[Names, tuple[Any, int]]()
@@ -157,7 +157,7 @@ class Kinematics:
         )
         return points_found
 
-    def still(self, of: Names, q: Array) -> Array:
+    def points_at_rest(self, of: Names, q: Array) -> Array:
         """Result of `points` for n states at rest."""
         zeros = np.zeros((len(q), self._engine.nu))
         return self.points(of, q, zeros, zeros)

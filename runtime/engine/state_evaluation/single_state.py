@@ -104,7 +104,7 @@ class _Record:
         self._ffi, self.by = engine.ffi, by
         ffi = engine.ffi
         self._record = record = ffi.new("mstmm_alone *")
-        record.model, record.inertia = engine.packed.model, engine.inertia_alone.packed.model
+        record.model, record.inertia = engine.packed.model, engine.inertia_only.packed.model
         is_fused = any(library is not None for library in self.by)
         p = np.array(fusion.numbers) if is_fused else np.zeros(0)
         arrays = p, engine.start_memory(), np.zeros(nu), np.empty(nq), np.empty(2 * nu)

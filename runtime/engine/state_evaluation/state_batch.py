@@ -128,7 +128,7 @@ def _lane_evaluation(
     def run(first: int, end: int) -> FailedState | None:
         selection = slice(first, end)
         efforts = None if states.efforts is None else states.efforts[selection]
-        codes = library.many(
+        codes = library.accelerations_batch(
             numbers if numbers.ndim == 1 else numbers[selection],
             states.t[selection],
             states.q[selection],
@@ -176,7 +176,7 @@ def _looped_evaluation(
 
 def _state_error(engine: LoopedEngine, states: StateBatch, failed: FailedState) -> NumericalFailure:
     i = failed.index
-    error = engine.failed(failed.failure, float(states.t[i]), states.q[i], states.u[i])
+    error = engine.evaluation_error(failed.failure, float(states.t[i]), states.q[i], states.u[i])
     error.args = (f"{_state_prefix(states.lead, i)}{error}",)
     return error
 

@@ -88,14 +88,15 @@ class Rest:
             raise NumericalFailure("the efforts of this state are not finite")
         return scaled_efforts
 
-    def after(self, q: Array, step: Array) -> Array:
+    def advance_state(self, q: Array, step: Array) -> Array:
         """Move q by a motion given in characteristic scales."""
         return self.moved(q, step * self.sizes)
 
     def slope(self, q: Array, size: float = _COARSE_STEP) -> Array:
         """Stiffness (n, n) in J, by central differences."""
         columns = [
-            (self.efforts(self.after(q, unit)) - self.efforts(self.after(q, -unit))) / (2 * size)
+            (self.efforts(self.advance_state(q, unit)) - self.efforts(self.advance_state(q, -unit)))
+            / (2 * size)
             for unit in size * np.eye(len(self.sizes))
         ]
         return np.array(columns).reshape(len(columns), len(columns)).T
@@ -185,7 +186,7 @@ def _solve_newton(
         )
         step_length = float(np.abs(step).max(initial=0.0))
         if step_length <= tolerance:
-            return problem.after(q, step)
+            return problem.advance_state(q, step)
         q, residual, is_decreasing = _line_search(problem, q, residual, step, scale)
         if not is_decreasing and step_length < _COARSE_STEP and _is_rounding(problem, q, residual):
             return q
@@ -254,7 +255,7 @@ def _line_search(
     last_valid: tuple[Array, Array] | None = None
     for _ in range(_MAX_HALVINGS):
         try:
-            trial = problem.after(q, step)
+            trial = problem.advance_state(q, step)
             efforts = problem.efforts(trial)
         except NumericalFailure:
             step, work = step / 2, work / 2

@@ -58,7 +58,7 @@ def _drawn_efforts(problem: Rest, q: Array, count: int, farthest: float) -> Arra
         distance = np.exp(draw.uniform(np.log(_NEAREST), np.log(farthest)))
         step = distance * draw.uniform(-1.0, 1.0, len(problem.sizes))
         try:
-            found.append(problem.efforts(problem.after(q, step)))
+            found.append(problem.efforts(problem.advance_state(q, step)))
         except (NumericalFailure, SceneError):
             continue
     return np.array(found)

@@ -65,7 +65,7 @@ class DirectionChoice:
     frame: Frame
     basis: Basis
     count: int
-    why: str
+    reason: str
 
 
 def direction_choices(
@@ -100,7 +100,7 @@ def can_use_mean_frame(beam: Beam, chosen: tuple[DirectionChoice, ...]) -> bool:
 def in_mean_frame(chosen: tuple[DirectionChoice, ...]) -> tuple[DirectionChoice, ...]:
     """The same choices, all with the mean frame."""
     why = "the mass matrix stays definite there"
-    return tuple(replace(c, frame=Frame("mean"), why=why if c.why else "") for c in chosen)
+    return tuple(replace(c, frame=Frame("mean"), reason=why if c.reason else "") for c in chosen)
 
 
 def missing_static_shapes(

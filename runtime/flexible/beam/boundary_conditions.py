@@ -150,7 +150,7 @@ def boundary_conditions(
         name,
         x,
         free,
-        hinge.facts is not None and hinge.facts.goes_anywhere,
+        hinge.facts is not None and hinge.facts.is_free,
         heavy_rotor=free if has_heavy_rotor else frozenset(),
         sprung=free if is_sprung or any(not e.is_zero for e in hinge.law.effort) else frozenset(),
         ends=ends,

@@ -70,7 +70,7 @@ class Direction:
         ends = self.ends[:, :6]
         return np.asarray(self.inertia * self.stiffness * (ends.T @ matrix @ ends))
 
-    def clamped(self, omega: Array) -> NDArray[np.int64]:
+    def clamped_mode_count(self, omega: Array) -> NDArray[np.int64]:
         """Number (k,) of natural frequencies below omega with both ends clamped.
 
         Wittrick and Williams 1971.
@@ -105,7 +105,7 @@ class HarmonicBeam:
         return 6 + len(self.static)
 
     @property
-    def told(self) -> tuple[object, ...]:
+    def cache_key(self) -> tuple[object, ...]:
         """Key that is equal for equal beams."""
         parts = [(d.bends, d.inertia, d.drag, d.stiffness, d.ends.tobytes())
                  for d in self.directions]  # fmt: skip
@@ -131,9 +131,9 @@ class HarmonicBeam:
         directions = tuple(replace(direction, drag=0.0) for direction in self.directions)
         return replace(self, directions=directions, delay=0.0, loss=0.0)
 
-    def clamped(self, omega: Array) -> NDArray[np.int64]:
+    def clamped_mode_count(self, omega: Array) -> NDArray[np.int64]:
         """Number (k,) of undamped natural frequencies below omega with both ends clamped."""
-        counts = (direction.clamped(omega) for direction in self.directions)
+        counts = (direction.clamped_mode_count(omega) for direction in self.directions)
         return sum(counts, np.zeros(len(omega), np.int64))
 
 

@@ -195,7 +195,7 @@ def _body_of_choices(
 def _choice_note(choice: DirectionChoice, count: int) -> str:
     frame = choice.frame
     where = f" at x = {frame.x:g} m" if frame.kind == "tangent" else ""
-    why = f", because {choice.why}" if choice.why else ""
+    why = f", because {choice.reason}" if choice.reason else ""
     shapes = f"{count} {choice.basis.kind} shape{'s' if count != 1 else ''}"
     return f"{choice.direction}: {shapes}, frame {frame.kind}{where}{why}"
 

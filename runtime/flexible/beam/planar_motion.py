@@ -183,7 +183,7 @@ class PlanarMotionCheck:
             return False
         body, _, end_rotation = self._end_pose(hinge.outboard)
         rotation = self._rotations[body] @ end_rotation
-        if facts.steady:
+        if facts.constant_subspace:
             turned = ((rotation @ np.array(t), rotation @ np.array(r)) for t, r in motions)
             return all(_is_planar(t, r, n) for t, r in turned)
         z = rotation @ np.array(hinge_frames(hinge)[1])[:, 2]

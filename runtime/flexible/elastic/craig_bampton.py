@@ -110,7 +110,7 @@ def reduce(
     if release is not None and (free_count == 6 or (free_count and not others)):
         assumed = _hinged_shapes(sections, held, others, release, modes)
     else:
-        release, clamped = None, sections.clamped(loaded)
+        release, clamped = None, sections.clamp(loaded)
         blocks = [clamped.constraint_shapes(port) for port in others]
         blocks.append(clamped.full(fixed_interface_modes(clamped, modes)))
         assumed = np.hstack(blocks)
@@ -148,7 +148,7 @@ def resolution(reduction: Reduction, release: Release | None) -> float:
     coupling = motions.T @ model.mass
     rigid_parts = np.linalg.solve(coupling @ motions, coupling @ shapes)
     loads = sections.expand.T @ (model.mass @ (shapes - motions @ rigid_parts))
-    added = sections.expand @ sections.clamped([held]).statics(np.asarray(loads))
+    added = sections.expand @ sections.clamp([held]).statics(np.asarray(loads))
 
     def frequencies(columns: Array) -> Array:
         momentum = coupling @ columns
@@ -168,7 +168,7 @@ def _hinged_shapes(
     """
     at_origin = twist_transform(-held.position)
     motions = sections.rigid @ (at_origin @ release.twists)
-    clamped = sections.clamped([held])
+    clamped = sections.clamp([held])
     rows = [sections.rows[port.name].toarray() for port in other_ports]
     rows.append(release.loaded.T @ sections.rows[held.name].toarray())
     static = clamped.statics(sections.relieved(np.vstack(rows).T, motions))

@@ -51,7 +51,7 @@ def second_order_moments(reduction: Reduction, ports: list[Port]) -> SecondOrder
     loads = np.hstack([_body_loads(reduction), *(_port_loads(reduction, p) for p in moving)])
     if reduction.frame == "mean":
         loads = reduction.sections.relieved(loads, reduction.sections.rigid)
-    static = reduction.sections.clamped([reduction.held]).statics(loads)
+    static = reduction.sections.clamp([reduction.held]).statics(loads)
     stiffnesses = model.stress(reduction.sections.expand @ static, reduction.shapes)
     stiffnesses = (stiffnesses + stiffnesses.transpose(0, 2, 1)) / 2
     if reduction.frame == "mean":
@@ -69,7 +69,7 @@ def truncation(reduction: Reduction, ports: list[Port]) -> Truncation:
     wrenches = [sections.rows[port.name].toarray().T for port in ports]
     loads = np.hstack([*wrenches, _body_loads(reduction)[:, 3:], inertia])
     loads = sections.relieved(loads, sections.rigid)
-    displacements = sections.clamped([reduction.held]).statics(loads)
+    displacements = sections.clamp([reduction.held]).statics(loads)
     modal_loads = sections.unknowns(shapes).T @ loads
     modal_stiffness = sections.model.inertia[0, 0] * reduction.frequencies**2
     kept = modal_loads.T @ (modal_loads / modal_stiffness[:, None])

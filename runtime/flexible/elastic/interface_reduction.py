@@ -104,7 +104,7 @@ class Sections:
         inertia = self.mass @ motions
         return np.asarray(loads - inertia @ np.linalg.solve(motions.T @ inertia, motions.T @ loads))
 
-    def clamped(self, held: Sequence[Port]) -> Clamped:
+    def clamp(self, held: Sequence[Port]) -> Clamped:
         """Body with the sections of some ports fixed, factorised once per set of ports."""
         names = tuple(port.name for port in held)
         return self._clamped.setdefault(names, Clamped(self, tuple(held)))

@@ -183,7 +183,7 @@ FreeMotions = tuple[tuple[tuple[float, ...], bool], ...]
 def _free_motions(name: str, held: str, hinge: Hinge | None, scene: Scene) -> FreeMotions:
     """Free motions of the inboard hinge of a body; none if not known or changing."""
     released = {event.hinge for event in scene.event}
-    if hinge is None or hinge.lets_go or hinge.name in released:
+    if hinge is None or hinge.is_released or hinge.name in released:
         return ()
     is_loaded = held in _loaded_ends(name, scene, excluded=hinge)
     is_coupled = any(
@@ -279,9 +279,9 @@ def _frame_and_reason(elastic: Elastic, hinge: Hinge | None, held: str) -> tuple
 def prescribes_rotation(hinge: Hinge) -> bool:
     """Whether a hinge prescribes all rotations of its outboard end at all times."""
     if hinge.facts is not None and not hinge.facts.turns:
-        return not hinge.lets_go
+        return not hinge.is_released
     is_driven = hinge.drive is not None and all(entry is not None for entry in hinge.drive)
-    return is_driven and not hinge.lets_go
+    return is_driven and not hinge.is_released
 
 
 def elastic_body(

@@ -131,10 +131,10 @@ def check_radius(name: str, radius: float | None) -> None:
 
 def check_size(tableau: Tableau, unknowns: int) -> None:
     """Raise SceneError if coordinates and speeds together exceed the limit of the method."""
-    if tableau.most_unknowns and unknowns > tableau.most_unknowns:
+    if tableau.max_unknowns and unknowns > tableau.max_unknowns:
         raise SceneError(
             f'method "{tableau.name}" computes the exponential of a matrix of all coordinates and '
-            f"speeds, at most {tableau.most_unknowns}; found {unknowns}: use rodas5p or, for "
+            f"speeds, at most {tableau.max_unknowns}; found {unknowns}: use rodas5p or, for "
             "undamped vibration, dop853, or fewer shapes of flexible bodies"
         )
 

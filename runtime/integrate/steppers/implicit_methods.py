@@ -386,7 +386,7 @@ class Exponential(Implicit):
     kind: ClassVar[int] = EXPONENTIAL
 
     def _check_consistency(self) -> None:
-        if not self.most_unknowns > 0:
+        if not self.max_unknowns > 0:
             raise ValueError(f"tableau {self.name}: most_unknowns must be positive")
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
@@ -411,5 +411,5 @@ def make_exponential(
         dense=hermite([0.0, 1.0, 0.0]),
         dense_order=order,
         second=to_read_only(np.zeros((3, 3))),
-        most_unknowns=most,
+        max_unknowns=most,
     )

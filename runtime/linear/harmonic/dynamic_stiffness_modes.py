@@ -52,14 +52,14 @@ class DynamicStiffnessModes(AssessedAnswer):
         coordinates: n names; for an exact beam, the deflection and the slope times length of its
             far end relative to the tangent at the near end.
         shapes: (n, k) mode shapes, the largest entry of each 1.
-        complete: always True: no mode below the last one is missing.
+        is_complete: always True: no mode below the last one is missing.
         findings: risks of the linear model.
     """
 
     omega: Array
     coordinates: tuple[str, ...] = field(repr=False)
     shapes: Array = field(repr=False)
-    complete: bool = True
+    is_complete: bool = True
     findings: Iterable[Risk] = field(default=(), repr=False)
 
     def __len__(self) -> int:
@@ -75,7 +75,7 @@ class DynamicStiffnessModes(AssessedAnswer):
         return {
             "omega": self.omega.tolist(), "frequency": self.frequency.tolist(),
             "coordinates": list(self.coordinates), "shapes": self.shapes.tolist(),
-            "complete": self.complete, **self.assessment(),
+            "complete": self.is_complete, **self.assessment(),
         }  # fmt: skip
 
 
@@ -88,7 +88,7 @@ def exact_modes(linear: LinearEquations, count: int, chosen: Chosen) -> DynamicS
     others = ("shapes", *CHANNEL_RISKS)
     shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
     return DynamicStiffnessModes(
-        omega, beams.linear.coordinates, counter.shapes(omega), findings=shapeless
+        omega, beams.linear.coordinate_names, counter.shapes(omega), findings=shapeless
     )
 
 
@@ -98,16 +98,16 @@ class _Counter:
     def __init__(self, beams: ExactBeams) -> None:
         linear = beams.linear
         engine, state = linear.model.looped, linear.state
-        self.beams, self.free = beams, list(linear.free)
+        self.beams, self.free = beams, list(linear.free_speed_indices)
         self.response = HarmonicResponse(
-            engine, state.t, state.q, state.u, state.a, exact=beams.bodies
+            engine, state.t, state.q, state.u, state.udot, exact=beams.bodies
         )  # fmt: skip
         if self.response.tangent.coupled:
             raise SceneError(
                 "exact modes: springs between bodies or loads that follow others reach across the "
                 "tree, where motions are not counted; take them out"
             )
-        if linear.pencil.skew() > _SYMMETRIC:
+        if linear.operators.skew() > _SYMMETRIC:
             raise SceneError(
                 "exact modes: loads follow the scene, so that its motions are not those of a "
                 "potential and cannot be counted; take them out, or ask for modes of shapes"
@@ -126,7 +126,7 @@ class _Counter:
         for beside in (*_BESIDE, 0.0):
             found = self.response.count_negative(-(omega**2))
             if (found >= 0).all():
-                return found + self.beams.clamped(omega)
+                return found + self.beams.clamped_mode_count(omega)
             omega = np.where(found < 0, omega * (1 + beside), omega)
         raise NumericalFailure(f"exact modes: near {omega[found < 0][0]:.9g} rad/s pivots vanish")
 

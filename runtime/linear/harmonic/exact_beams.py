@@ -59,7 +59,7 @@ class ExactBeams:
     @property
     def bodies(self) -> DynamicStiffnessBodies:
         """Bodies of the exact beams, with their dynamic stiffness, for the sweep."""
-        positions = self.linear.model.packed.positions
+        positions = self.linear.model.packed_scene.positions
         return DynamicStiffnessBodies(
             tuple(positions[name] for name in self.names), self._stiffness
         )
@@ -73,9 +73,11 @@ class ExactBeams:
     def _stiffness(self, s: Complex) -> list[Complex]:
         return self._each(lambda beam: beam.stiffness(s))
 
-    def clamped(self, omega: Array) -> Integers:
+    def clamped_mode_count(self, omega: Array) -> Integers:
         """Number (k,) of clamped-clamped modes of all exact beams below omega (k,), rad/s."""
-        return np.asarray(sum(self._each(lambda beam: beam.clamped(omega))), dtype=np.int64)
+        return np.asarray(
+            sum(self._each(lambda beam: beam.clamped_mode_count(omega))), dtype=np.int64
+        )
 
     @property
     def slowest(self) -> float:
@@ -97,7 +99,7 @@ def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> Exac
     Raises SceneError for names that are no flexible beams, and for beams and states outside the
     validity of the solution.
     """
-    if linear.mechanism is not None:
+    if linear.constrained_motion is not None:
         raise SceneError("exact: a loop is closed; the solution goes along trees alone")
     if linear.state.u.any():
         raise SceneError("exact: this state moves; the solution is that of beams at rest")
@@ -122,7 +124,9 @@ def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> Exac
 
 
 def _names(model: CompiledScene, chosen: Chosen) -> tuple[str, ...]:
-    flexible = [beam.name for beam in model.scene.beam if beam.name in model.layout.modal]
+    flexible = [
+        beam.name for beam in model.scene.beam if beam.name in model.coordinate_layout.modal
+    ]
     if chosen is True:
         if not flexible:
             raise SceneError("exact: the scene has no flexible beam")
@@ -165,14 +169,14 @@ def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> Linea
     data = scene_data(model.scene)
     for beam in data["beam"]:
         if beam["name"] in names:
-            _reshape(beam, model.flexible[beam["name"]].modes)
+            _reshape(beam, model.flexible_bodies[beam["name"]].modes)
     made = type(model)(scene_from_data(data, model.scene), model.known)
     q = np.zeros(made.nq)
-    hinges = min((slots.q for slots in model.layout.modal.values()), default=model.nq)
+    hinges = min((slots.q for slots in model.coordinate_layout.modal.values()), default=model.nq)
     q[:hinges] = linear.state.q[:hinges]
-    for name, slots in model.layout.modal.items():
+    for name, slots in model.coordinate_layout.modal.items():
         if name not in names:
-            q[made.layout.modal[name].q_slice] = linear.state.q[slots.q_slice]
+            q[made.coordinate_layout.modal[name].q_slice] = linear.state.q[slots.q_slice]
     still = np.zeros(made.nu)
     _, a = made.looped.accelerations(
         linear.state.t, q[None].copy(), still[None].copy(), made.looped.start_memory()[None]
@@ -180,8 +184,8 @@ def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> Linea
     dry = None if linear.dry is None else dry_friction(made, still, linear.dry.amplitudes)
     return replace(
         linear, model=made, state=State(linear.state.t, q, still, a[0]), dry=dry,
-        controls=tuple(channel(made, one.name) for one in linear.controls),
-        others=tuple(channel(made, one.name) for one in linear.others),
+        input_channels=tuple(channel(made, one.name) for one in linear.input_channels),
+        disturbance_channels=tuple(channel(made, one.name) for one in linear.disturbance_channels),
     )  # fmt: skip
 
 
@@ -199,7 +203,7 @@ def _distinct(
     linear: LinearEquations, tables: dict[str, Beam], names: Sequence[str], losses: Sequence[float]
 ) -> tuple[HarmonicBeam, ...]:
     """Harmonic beams; equal beams share one object."""
-    packed, known = linear.model.packed, dict[tuple[object, ...], HarmonicBeam]()
+    packed, known = linear.model.packed_scene, dict[tuple[object, ...], HarmonicBeam]()
     found = []
     for name, loss in zip(names, losses, strict=True):
         place = packed.placements[name]
@@ -208,7 +212,7 @@ def _distinct(
         beam = harmonic_beam(
             beam_data(tables[name]), body, turn.T, tables[name].damping.stiffness, loss
         )
-        found.append(known.setdefault(beam.told, beam))
+        found.append(known.setdefault(beam.cache_key, beam))
     return tuple(found)
 
 
@@ -225,13 +229,18 @@ def _refuse_bent(
     missing = model.looped.inverse_dynamics(state.t, state.q, still, still, memory)
     x = still.copy()
     for name in names:
-        slots = model.layout.modal[name].u_slice
+        slots = model.coordinate_layout.modal[name].u_slice
         x[slots] = np.random.default_rng(0).uniform(0.5, 1.0, slots.stop - slots.start)
     pulled = _stiffness(linear, x)
     for name in names:
-        slots, stiffness = model.layout.modal[name].u_slice, model.flexible[name].K
+        slots, stiffness = (
+            model.coordinate_layout.modal[name].u_slice,
+            model.flexible_bodies[name].K,
+        )
         bent = np.abs(np.linalg.solve(stiffness, missing[slots])).max()
-        start = np.abs(given.state.q[given.model.layout.modal[name].q_slice]).max(initial=0)
+        start = np.abs(given.state.q[given.model.coordinate_layout.modal[name].q_slice]).max(
+            initial=0
+        )
         if max(bent, start) > _STRAIGHT * tables[name].length:
             raise SceneError(
                 f'exact: beam "{name}" is bent at rest; the solution is that of a straight one; '
@@ -250,7 +259,7 @@ def _stiffness(linear: LinearEquations, x: Array) -> Array:
     state = linear.state
     tangent = TangentMatrix(standing(linear.model.looped, state))
     moved = tangent.rates(state.q, x)
-    tangent.residual(state.t, state.q, state.u, state.a)
+    tangent.residual(state.t, state.q, state.u, state.udot)
     still = np.zeros(len(x))
     return tangent.slope(0.0, moved, still, still)
 

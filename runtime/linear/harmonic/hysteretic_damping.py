@@ -47,7 +47,7 @@ def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
 
     Raises SceneError for a name without stiffness and for a negative loss factor.
     """
-    model, engine, state = linear.model, linear.tree, linear.state
+    model, engine, state = linear.model, linear.open_tree, linear.state
     system, lossy = engine.packed.system, by_name(model, losses)
     bodies = tuple(_stiffer_shapes(model, run, lossy) for run in system.bodies)
 
@@ -88,8 +88,8 @@ def _factor(what: str, value: float) -> float:
 
 def _elastic(model: CompiledScene) -> Iterator[str]:
     """Names of elements that may have a loss factor."""
-    packed = model.packed
-    yield from model.layout.modal
+    packed = model.packed_scene
+    yield from model.coordinate_layout.modal
     yield from (one.name for one in packed.scene.forces)
     for run in packed.system.laws:
         for _, body, _, _ in run.each():
@@ -99,7 +99,7 @@ def _elastic(model: CompiledScene) -> Iterator[str]:
 
 
 def _stiffer_shapes(model: CompiledScene, run: BodyRun, lossy: Callable[[str], float]) -> BodyRun:
-    names = {slots.q: name for name, slots in model.layout.modal.items()}
+    names = {slots.q: name for name, slots in model.coordinate_layout.modal.items()}
 
     def one(body: BodyNumbers) -> BodyNumbers:
         if body.modal is None:

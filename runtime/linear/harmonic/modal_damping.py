@@ -73,14 +73,16 @@ def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
     if alone:
         check_dense_size(len(linear), "the matrix of all motions")
     found = modes(linear, None if alone else len(zeta), False)
-    if not found.undamped or found.growing.any():
+    if not found.is_undamped or found.unstable.any():
         raise SceneError(
             "modal: near this state a motion grows, or loads follow the scene, so that its motions "
             "are no vibrations to damp; damp laws, or give structural"
         )
     rates = 2 * zeta * found.omega
     damped = np.flatnonzero(rates)
-    if linear.mechanism is not None:  # the mass matrix of the sweep is that of the spanning tree
+    if (
+        linear.constrained_motion is not None
+    ):  # the mass matrix of the sweep is that of the spanning tree
         return ModalDamping(linear.M @ found.shapes[:, damped], rates[damped])
-    mass = [linear.pencil.mass(found.shapes[:, k]) for k in damped]
+    mass = [linear.operators.mass(found.shapes[:, k]) for k in damped]
     return ModalDamping(np.array(mass).reshape(len(damped), len(linear)).T, rates[damped])

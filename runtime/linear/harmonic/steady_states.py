@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 def refuse_turning(linear: LinearEquations) -> None:
     """Raise SceneError for exact beams about a state with rotating balls: no matrices exist."""
-    if linear.turning is not None:
+    if linear.rate_matrix is not None:
         raise SceneError(
             "exact: the state turns a ball, a free or another hinge whose rates go by its "
             "coordinates; ask about a state at rest, or leave beams their shapes"
@@ -43,7 +43,7 @@ def refuse_unsteady(
     if not linear.state.u.any() and not later.driven:
         return
     changing = find_changes(linear, later, pushes, shown)
-    if linear.turning is not None and (leaving := find_departure(linear)) is not None:
+    if linear.rate_matrix is not None and (leaving := find_departure(linear)) is not None:
         changing += leaving.coordinates
     if changing:
         raise SceneError(

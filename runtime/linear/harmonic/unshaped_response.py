@@ -52,7 +52,7 @@ def unshaped_response_risks(
     """Risks of beam directions without shapes that change the response at omega (k,), rad/s."""
     lacking = {
         name: directions
-        for name, body in linear.model.flexible.items()
+        for name, body in linear.model.flexible_bodies.items()
         if (directions := [d for d in unshaped_directions(body) if d != "axial"])
     }
     if not lacking or linear.carrying is not None:
@@ -61,7 +61,7 @@ def unshaped_response_risks(
     try:
         fuller = _with_shapes(linear, inputs, lacking)
         given, _ = response(linear, inputs, omega[picked])
-        expected, rounding = response(fuller, fuller.controls, omega[picked])
+        expected, rounding = response(fuller, fuller.input_channels, omega[picked])
     except MstmmError as failure:  # undamped resonance, or the scene rejects the added shapes
         yield information(
             "unexamined", "the response",
@@ -92,7 +92,7 @@ def _with_shapes(
     data = scene_data(model.scene)
     for beam in data["beam"]:
         if beam["name"] in lacking:
-            body = model.flexible[beam["name"]]
+            body = model.flexible_bodies[beam["name"]]
             for key in ("initial", "shapes"):
                 beam.pop(key, None)
             counts = Counter(mode.rstrip("0123456789") for mode in body.modes)
@@ -109,11 +109,11 @@ def _with_shapes(
 
 def _by_mode(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
     """Coordinates or speeds of `model` in the order of `made`, zero for added shape functions."""
-    slices = [getattr(slots, part) for slots in model.layout.modal.values()]
+    slices = [getattr(slots, part) for slots in model.coordinate_layout.modal.values()]
     hinges = min(one.start for one in slices)
     pieces = [values[:hinges]]
-    for name in made.layout.modal:
-        own = values[getattr(model.layout.modal[name], part)]
-        modes = dict(zip(model.flexible[name].modes, own, strict=True))
-        pieces.append(np.array([modes.get(mode, 0.0) for mode in made.flexible[name].modes]))
+    for name in made.coordinate_layout.modal:
+        own = values[getattr(model.coordinate_layout.modal[name], part)]
+        modes = dict(zip(model.flexible_bodies[name].modes, own, strict=True))
+        pieces.append(np.array([modes.get(mode, 0.0) for mode in made.flexible_bodies[name].modes]))
     return np.concatenate(pieces)

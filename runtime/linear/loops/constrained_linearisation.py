@@ -125,7 +125,7 @@ class ConstrainedLinearisation:
                 f'"{coordinate(self.model, speed)}": motions of drives of closed loops are inputs '
                 "beside a state at rest, and this one moves or does not last; leave them out"
             )
-        freedom = self.model.freedom
+        freedom = self.model.independent_speeds
         assert freedom is not None
         along = freedom.driving(state.q, speed)
         if not np.isfinite(along).all():
@@ -163,9 +163,9 @@ def mechanism_at(
     Raises NumericalFailure where the independent speeds do not determine all others: dead centre,
     singular configuration, open loop.
     """
-    if model.freedom is None:
+    if model.independent_speeds is None:
         return None
-    found = _mechanism(model, state, model.freedom.chosen(state.q), dry)
+    found = _mechanism(model, state, model.independent_speeds.select(state.q), dry)
     tree, free, ways = found.tree, found.free, found.ways
     carried = _along(model.looped, state, free, ways, _with_own_still(model, ways)).K
     return replace(found, turned=carried - _along(tree, state, free, ways, ways).K)
@@ -183,9 +183,9 @@ def moving_at(
     Raises SceneError for scenes whose accelerations have no derivatives, NumericalFailure as
     `mechanism_at`.
     """
-    if model.freedom is None:
+    if model.independent_speeds is None:
         return None
-    found = _mechanism(model, state, places or model.freedom.chosen(state.q), dry)
+    found = _mechanism(model, state, places or model.independent_speeds.select(state.q), dry)
     return replace(found, motion=Motion.of(slopes(state), found.places, found.ways), slopes=slopes)
 
 
@@ -193,18 +193,18 @@ def _mechanism(
     model: CompiledScene, state: State, places: tuple[int, ...], dry: DryFriction | None
 ) -> ConstrainedLinearisation:
     """Linearisation without the effects of constraint loads and of motion."""
-    freedom = model.freedom
+    freedom = model.independent_speeds
     assert freedom is not None
     ways, n = freedom.following(state.q, places), len(places)
     rough, tree = torn_trees(model, dry)
     return ConstrainedLinearisation(
-        model, tree, model.free_speeds, places, ways, np.zeros((n, n)), rough=rough, dry=dry
+        model, tree, model.free_speed_indices, places, ways, np.zeros((n, n)), rough=rough, dry=dry
     )
 
 
 def torn_trees(model: CompiledScene, dry: DryFriction | None) -> tuple[LoopedEngine, LoopedEngine]:
     """Spanning tree of the scene, and the same with viscous dampers for `dry` friction."""
-    packed, system = model.packed, with_loops_open(model.packed.system)
+    packed, system = model.packed_scene, with_loops_open(model.packed_scene.system)
     tree = LoopedEngine(packed_system(system, packed))
     if not dry:
         return tree, tree
@@ -227,7 +227,7 @@ def _along(
 
 def _with_own_still(model: CompiledScene, ways: Array) -> Array:
     """`ways` (nu, n) with zero rows for cut hinges, whose loads act on their bodies instead."""
-    system, rows = model.packed.system, ways.copy()
+    system, rows = model.packed_scene.system, ways.copy()
     for one in system.closures:
         first = int(system.places["u"][one.frame])
         rows[first : first + system.body(one.frame).nu] = 0.0

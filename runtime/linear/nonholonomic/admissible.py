@@ -39,7 +39,7 @@ _ROUNDING = 1e-9
 
 def has_speed_rows(model: CompiledScene) -> bool:
     """Whether the scene has nonholonomic rows: rolling discs, couplings of speeds."""
-    scene = model.packed.described
+    scene = model.packed_scene.described
     return any(one.type == ROLLING for one in scene.constraint) or any(
         one.speeds is not None for one in scene.coupling
     )
@@ -75,7 +75,7 @@ class RollingMechanism(ConstrainedLinearisation):
 
         `rotation` (nu, nu) maps from the axes of the bodies at q to the frames.
         """
-        freedom, places = self.model.freedom, list(self.speed_places)
+        freedom, places = self.model.independent_speeds, list(self.speed_places)
         assert freedom is not None
         wished = rotation.T @ u
         found = freedom.without_slip(q, wished)
@@ -124,16 +124,16 @@ def rolling_at(
     Raises NumericalFailure where the independent speeds do not determine all others: dead centre,
     singular configuration, open loop.
     """
-    freedom = model.freedom
+    freedom = model.independent_speeds
     assert freedom is not None
     rows = _Rows(freedom, state.q)
     basis = rows.allowed(rows.of_positions)
     if own is None:
-        free = list(model.free_speeds)
+        free = list(model.free_speed_indices)
         size = np.abs(state.u).max(initial=0.0) ** 2
         leaves = np.zeros(model.nu) if changing is None else np.abs(changing) > _ROUNDING * size
         lasting = sorted(free, key=lambda k: bool(leaves[k]))
-        motions = np.linalg.qr(freedom.following(state.q, freedom.chosen(state.q))
+        motions = np.linalg.qr(freedom.following(state.q, freedom.select(state.q))
                                / freedom.sizes[:, None])[0]  # fmt: skip
         own = (
             tuple(sorted(select_rows(basis, free)[0])),
@@ -148,7 +148,7 @@ def rolling_at(
     nothing = np.zeros((len(positions), len(positions)))
     rough, tree = torn_trees(model, dry)
     return RollingMechanism(
-        model, tree, model.free_speeds, positions, ways, nothing, rough=rough, dry=dry,
+        model, tree, model.free_speed_indices, positions, ways, nothing, rough=rough, dry=dry,
         speed_places=speeds, speed_ways=speed_ways, swept=swept,
     )  # fmt: skip
 
@@ -192,6 +192,6 @@ class _Rows:
         found = np.zeros(len(self._J))
         for count, weight in _WEIGHTS.items():
             for sign in (1.0, -1.0):
-                q = self._freedom.moved(self._q, sign * count * step * way)
+                q = self._freedom.move(self._q, sign * count * step * way)
                 found += sign * weight / step * self._freedom.slip(q, u)
         return found

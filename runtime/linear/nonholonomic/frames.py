@@ -53,7 +53,7 @@ def frames_at(model: CompiledScene, state: State) -> Frames:
     for slots in _turning(model):
         parts = [slice(k, k + 3) for k in range(slots.u, slots.u + slots.nu, 3)]
         speeds = np.vstack([cross_matrix(state.u[part]) for part in parts])
-        changes = np.concatenate([state.a[part] for part in parts])
+        changes = np.concatenate([state.udot[part] for part in parts])
         rate = np.linalg.lstsq(speeds, changes, rcond=_ROUNDING)[0]  # u x w = du/dt
         if np.abs(rate).max() > _ROUNDING * np.abs(state.u[slots.u_slice]).max(initial=0.0):
             rates[slots.name] = rate
@@ -74,8 +74,8 @@ def turns_in_space(model: CompiledScene, state: State, frames: Frames) -> bool:
 
 def _turning(model: CompiledScene) -> Iterator[HingeSlots]:
     """Quaternion hinges with speeds in axes of the outboard body, angular speeds last."""
-    for slots in model.layout.hinges.values():
-        if slots.quaternion is not None and slots.steady and slots.nu in (3, 6):
+    for slots in model.coordinate_layout.hinges.values():
+        if slots.quaternion is not None and slots.constant_subspace and slots.nu in (3, 6):
             yield slots
 
 

@@ -79,28 +79,28 @@ class NonholonomicLinear(Linear):
 
     @property
     def _rolling(self) -> RollingMechanism:
-        assert isinstance(self.mechanism, RollingMechanism)
-        return self.mechanism
+        assert isinstance(self.constrained_motion, RollingMechanism)
+        return self.constrained_motion
 
     @property
     def speeds(self) -> tuple[str, ...]:
         """Names of v."""
-        return tuple(self.model.layout.u_name(k) for k in self._rolling.speed_places)
+        return tuple(self.model.coordinate_layout.u_name(k) for k in self._rolling.speed_places)
 
     @property
-    def states(self) -> tuple[str, ...]:
+    def state_names(self) -> tuple[str, ...]:
         """Names of (x, v)."""
-        return (*self.coordinates, *self.speeds)
+        return (*self.coordinate_names, *self.speeds)
 
     @property
-    def positions(self) -> list[int]:
+    def position_states(self) -> list[int]:
         """Indices of x in the state."""
         return list(range(len(self)))
 
     @property
-    def velocities(self) -> list[int]:
+    def velocity_states(self) -> list[int]:
         """Indices of v in the state."""
-        return list(range(len(self), len(self.states)))
+        return list(range(len(self), len(self.state_names)))
 
     @property
     def has_stiffness(self) -> bool:
@@ -178,12 +178,12 @@ class NonholonomicLinear(Linear):
     @cached_property
     def B(self) -> Array:
         """Input matrix (n + m, inputs)."""
-        return self._effect(self.controls)
+        return self._effect(self.input_channels)
 
     @cached_property
     def B_disturbances(self) -> Array:
         """Input matrix (n + m, disturbances) of w."""
-        return self._effect(self.others)
+        return self._effect(self.disturbance_channels)
 
     def _effect(self, pushes: Sequence[Channel]) -> Array:
         """Input matrix (n + m, inputs) of some inputs."""
@@ -206,11 +206,11 @@ class NonholonomicLinear(Linear):
         increments, speeds = np.split(self._turned.T @ self._basis, 2)
         slopes = self._slopes
         along = (increments, speeds, slopes["q"] @ increments + slopes["u"] @ speeds)
-        c, d = np.zeros((len(rows.through), len(self.states))), rows.through.copy()
+        c, d = np.zeros((len(rows.through), len(self.state_names))), rows.through.copy()
         for order, wide in rows.orders.items():
             c += wide @ along[order]
             if order == 2:
-                d += wide @ speeds[:, self.velocities] @ b[self.velocities]
+                d += wide @ speeds[:, self.velocity_states] @ b[self.velocity_states]
         return c, d
 
     # --- modes and frequency response -------------------------------------------------------------
@@ -225,7 +225,7 @@ class NonholonomicLinear(Linear):
         """
         if damped is not None and not damped:
             raise SceneError("damped = False: A beside rolling contacts has no parts; leave it out")
-        self.check_count(count, len(self.states))
+        self.check_count(count, len(self.state_names))
         values, vectors = eigenpairs(self.A)
         n, k = len(self), np.arange(len(values))
         shapes = np.where(vectors[:n].any(axis=0), vectors[:n], self.A[:n] @ vectors)
@@ -234,7 +234,7 @@ class NonholonomicLinear(Linear):
         increments, speeds = np.split(self._turned.T @ self._basis @ (vectors / scale), 2)
         moved = np.where(speeds.any(axis=0), speeds, increments)
         found = NonholonomicModes(self, values, shapes / scale, True, moved)
-        return found if count is None else found.first(int(count))
+        return found if count is None else found.lowest(int(count))
 
     def frequency_response(
         self,
@@ -269,7 +269,7 @@ class NonholonomicLinear(Linear):
         )  # fmt: skip
 
     def _solve(self, omega: float, b: Array) -> Complex:
-        shifted = 1j * omega * np.eye(len(self.states)) - self.A
+        shifted = 1j * omega * np.eye(len(self.state_names)) - self.A
         if not np.linalg.cond(shifted) < _SINGULAR:
             raise NumericalFailure(
                 f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping; "
@@ -313,7 +313,11 @@ class NonholonomicLinear(Linear):
     @property
     def _ways(self) -> Ways:
         """Motions along the independent speeds."""
-        layout, rolling, places = self.model.layout, self._rolling, list(self._rolling.speed_places)
+        layout, rolling, places = (
+            self.model.coordinate_layout,
+            self._rolling,
+            list(self._rolling.speed_places),
+        )
         hinges = [layout.hinge_of_speed(k) for k in places]
         units = [h.u_units[k - h.u].removesuffix("/s") for h, k in zip(hinges, places, strict=True)]
         along = rolling.speed_ways
@@ -327,10 +331,10 @@ class NonholonomicLinear(Linear):
         found, sizes = list[str](), speed_scales(self.model)
         for one in (self, self._later):
             state, places = one.state, [*self._rolling.speed_places]
-            left = (one.turned @ (state.a + self.frames.generator @ state.u))[places]
+            left = (one.turned @ (state.udot + self.frames.generator @ state.u))[places]
             bound = _STILL + _ROUNDING * float(np.square(state.u / sizes).max(initial=0.0))
             leaving = np.flatnonzero(np.abs(left) > bound * sizes[places])
-            found += [self.model.layout.u_name(places[k]) for k in leaving]
+            found += [self.model.coordinate_layout.u_name(places[k]) for k in leaving]
         return list(dict.fromkeys(found))
 
     def _changes(self) -> bool:
@@ -345,7 +349,7 @@ class NonholonomicLinear(Linear):
         model, own = self.model, self._rolling
         state, rotation = _ahead(self)
         rolling = rolling_at(model, state, None, self.dry, (own.places, own.speed_places))
-        return replace(self, state=state, mechanism=rolling, rotation=rotation)
+        return replace(self, state=state, constrained_motion=rolling, rotation=rotation)
 
     def _refuse_unsteady(self, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]) -> None:
         """Raise SceneError where matrices, inputs or outputs change along the motion."""
@@ -380,14 +384,14 @@ class NonholonomicModes(Modes):
         assert isinstance(linear, NonholonomicLinear)
         return linear.frame
 
-    def first(self, count: int) -> NonholonomicModes:
+    def lowest(self, count: int) -> NonholonomicModes:
         """The first `count` modes."""
         return replace(
             self, eigenvalues=self.eigenvalues[:count], shapes=self.shapes[:, :count],
             moved=self.moved[:, :count],
         )  # fmt: skip
 
-    def kinetic(self) -> dict[str, Array]:
+    def kinetic_energy_shares(self) -> dict[str, Array]:
         """Share (k,) of each body in the kinetic energy of the modes, by body."""
         return energy_shares.kinetic_of_speeds(self.linear.model, self.linear.state.q, self.moved)
 
@@ -399,10 +403,11 @@ def nonholonomic_at(bare: Linear, slopes: Slopes) -> NonholonomicLinear:
     """
     model, state, dry = bare.model, bare.state, bare.dry
     frames = frames_at(model, state)
-    changing = state.a + frames.generator @ state.u
+    changing = state.udot + frames.generator @ state.u
     return NonholonomicLinear(
-        model, state, bare.controls, bare.others, mechanism=rolling_at(model, state, changing, dry),
-        dry=dry, frames=frames, slopes=slopes,
+        model, state, bare.input_channels, bare.disturbance_channels,
+        constrained_motion=rolling_at(model, state, changing, dry), dry=dry, frames=frames,
+        slopes=slopes,
     )  # fmt: skip
 
 

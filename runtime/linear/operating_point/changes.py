@@ -52,7 +52,7 @@ def _effects(linear: LinearEquations, pushes: Sequence[Channel]) -> list[Array]:
     if not pushes:
         return []
     efforts = np.zeros((len(pushes), linear.model.nu))
-    efforts[:, list(linear.free)] = linear.pushed(pushes).T
+    efforts[:, list(linear.free_speed_indices)] = linear.input_matrix(pushes).T
     found = HarmonicLoads.of(linear, pushes, efforts)
     return [found.columns[found.parts[:, k] != 0] for k in range(len(pushes))]
 
@@ -65,7 +65,7 @@ def _rows(
     Each row has the factors of increments, rates and accelerations, of those of drives that are
     inputs, and the feedthrough of the inputs.
     """
-    places = [*linear.free, *(speed for one in pushes for speed, _ in one.moves)]
+    places = [*linear.free_speed_indices, *(speed for one in pushes for speed, _ in one.moves)]
     found, none = [], np.zeros((1, linear.model.nu))
     for one in shown:
         rows = rows_of(linear, [one], pushes)

@@ -57,7 +57,7 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     With `later`, states further along its motion are also checked.
     """
     states = [linear.state, *(() if later is None else later.every)]
-    free = list(linear.free)
+    free = list(linear.free_speed_indices)
     a = np.array([one.a[free] for one in states]).T
     if not a.any():
         return None
@@ -69,8 +69,8 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
         leaves[:, 1:] = False
     work = np.where(leaves, np.abs(efforts) * sizes[:, None], 0.0)
     worst, at = np.unravel_index(int(work.argmax()), work.shape)
-    names = [linear.coordinates[k] for k in np.flatnonzero(leaves.any(axis=1))]
-    unit = "N*m" if linear.units[worst] == "rad" else "N"
+    names = [linear.coordinate_names[k] for k in np.flatnonzero(leaves.any(axis=1))]
+    unit = "N*m" if linear.coordinate_units[worst] == "rad" else "N"
     effort = float(efforts[worst, at])
     largest_load = total_weight(linear.model) * scene_length(linear.model)
     is_small = (
@@ -79,7 +79,9 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
         and work.max() <= _SMALL_EFFORT * largest_load
         and _forced_distance(linear, later, efforts, sizes) <= _SMALL_DISTANCE
     )
-    return Departure(names, linear.coordinates[worst], effort, unit, states[at].t, bool(is_small))
+    return Departure(
+        names, linear.coordinate_names[worst], effort, unit, states[at].t, bool(is_small)
+    )
 
 
 def _leaving(
@@ -123,16 +125,16 @@ def _forced_distance(
 
 def _efforts(linear: LinearEquations, a: Array) -> Array:
     """Product M a (n, k), for trees without matrices."""
-    if linear.mechanism is not None:
+    if linear.constrained_motion is not None:
         return linear.M @ a
-    return np.array([linear.pencil.mass(column) for column in a.T]).T
+    return np.array([linear.operators.mass(column) for column in a.T]).T
 
 
 def _displacement_by_sweep(linear: LinearEquations, a: Array) -> Array:
     """Distance (n,) from equilibrium, K^-1 M a, without matrices; infinite if K is singular."""
-    if linear.mechanism is not None or linear.turning is not None:
+    if linear.constrained_motion is not None or linear.rate_matrix is not None:
         return np.where(a == 0, 0.0, np.inf)
-    pencil = linear.pencil
+    pencil = linear.operators
     try:
         pencil.factor(0.0)
     except NumericalFailure:

@@ -71,7 +71,7 @@ class DryFriction:
 
     def replaced(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
         """Laws of the system of the model with viscous damping instead of this friction."""
-        first = self.model.packed.system.places["u"]
+        first = self.model.packed_scene.system.places["u"]
 
         def change(law: LawNumbers, body: int) -> LawNumbers:
             one = self.rubbing.get(int(first[body]) + law.speed)
@@ -86,7 +86,7 @@ class DryFriction:
 
     def engine(self, model: CompiledScene) -> LoopedEngine:
         """Looped engine of the model, or of its variant with other parameters, with these laws."""
-        packed = model.packed
+        packed = model.packed_scene
         made = replace(packed.system, laws=self.replaced(packed.system.laws))
         return LoopedEngine(packed_system(made, packed))
 
@@ -113,7 +113,7 @@ def dry_friction(model: CompiledScene, u: Array, amplitudes: Amplitudes) -> DryF
 
     Raises SceneError for names without friction and amplitudes that are not positive.
     """
-    system, free = model.packed.system, set(model.free_speeds)
+    system, free = model.packed_scene.system, set(model.free_speed_indices)
     laws = [law for run in system.laws for law in run.pattern]
     if not any(law.kernel == _KERNEL and law.p[_STATIC] for law in laws) and amplitudes is None:
         return DryFriction(model, {}, None)
@@ -149,7 +149,7 @@ def _amplitudes(
     if not isinstance(given, Mapping):
         amplitude = _amplitude("friction", given)
         return lambda speed: amplitude
-    known = {speed: _names(model.layout.u_name(speed)) for speed in speeds}
+    known = {speed: _names(model.coordinate_layout.u_name(speed)) for speed in speeds}
     every = sorted({name for names in known.values() for name in names})
     for name in given:
         if name not in every:

@@ -51,18 +51,18 @@ class LaterStates:
     """
 
     def __init__(self, linear: LinearEquations) -> None:
-        self._linear, system = linear, linear.model.packed.system
+        self._linear, system = linear, linear.model.packed_scene.system
         state, first = linear.state, system.places["u"]
         drives = [int(first[place]) + k for place, k in system.driven]
-        self.driven = [k for k in drives if state.u[k] or state.a[k]]
+        self.driven = [k for k in drives if state.u[k] or state.udot[k]]
         turning = [*self._at(self._phases())]
-        timed = [] if system.steady else [*self._at([*_TIMES, *self._breaks()])]
+        timed = [] if system.is_autonomous else [*self._at([*_TIMES, *self._breaks()])]
         uniform = not self.driven or all(
             np.allclose(one.u[drives], state.u[drives], rtol=1e-12)
-            and not one.a[drives].any() for one in timed
+            and not one.udot[drives].any() for one in timed
         )  # fmt: skip
         fixed = not self.driven and all(not one.u[drives].any() for one in timed)
-        depends = system.timed or system.closes or not (uniform or fixed)
+        depends = system.has_timed_loads or system.closes or not (uniform or fixed)
         self.every = [*turning, *timed]
         self.sparse = [*turning, *(timed[::_SPARSE] if depends else ())]
 
@@ -75,7 +75,7 @@ class LaterStates:
     def cause(self) -> str:
         """Cause of later changes, for messages."""
         model = self._linear.model
-        hinges = dict.fromkeys(model.layout.hinge_of_speed(k).name for k in self.driven)
+        hinges = dict.fromkeys(model.coordinate_layout.hinge_of_speed(k).name for k in self.driven)
         if hinges:
             return f"while drives move on (of {abbreviate_names(list(hinges))})"
         if self._linear.state.u.any():
@@ -116,20 +116,25 @@ class LaterStates:
 
 def equations_at(linear: LinearEquations, state: State) -> LinearEquations:
     """Linear equations at another state of the same motion."""
-    loops = linear.mechanism
+    loops = linear.constrained_motion
     loops = None if loops is None else loops.at(state)
-    turning, carrying = linear.turning if loops is None else loops.turning, linear.carrying
+    turning, carrying = linear.rate_matrix if loops is None else loops.turning, linear.carrying
     if carrying is not None:
         carrying = carrying.later(state.t - linear.state.t)
     return replace(
-        linear, state=state, about=None, mechanism=loops, turning=turning, carrying=carrying
+        linear,
+        state=state,
+        compiled_state=None,
+        constrained_motion=loops,
+        rate_matrix=turning,
+        carrying=carrying,
     )
 
 
 def _state_after(linear: LinearEquations, dt: float) -> State | None:
     """State after dt (s); None if closed loops would need too many projections."""
     state, count = linear.state, 1
-    if linear.mechanism is not None:
+    if linear.constrained_motion is not None:
         rate = float((np.abs(state.u) / speed_scales(linear.model)).max(initial=0))
         count = max(1, int(np.ceil(dt * rate / _STRIDE)))
         if count > _MOST_STRIDES:
@@ -145,14 +150,14 @@ def _state_after(linear: LinearEquations, dt: float) -> State | None:
 
 def _moved(linear: LinearEquations, t: float, q: Array, u: Array, dt: float) -> tuple[Array, Array]:
     """State at t after a step dt that satisfies drives and loops and keeps the speeds of x."""
-    model, loops = linear.model, linear.mechanism
+    model, loops = linear.model, linear.constrained_motion
     engine = model.looped
     rates = engine.rates(t, q, u, engine.start_memory())
-    q = move_steadily(q, rates, dt, model.layout.quaternions.tolist())
+    q = move_steadily(q, rates, dt, model.coordinate_layout.quaternions.tolist())
     whole = SceneSystem(engine).start(t, q, u)
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
-    if loops is not None and model.freedom is not None:
+    if loops is not None and model.independent_speeds is not None:
         places = list(loops.places)
-        ways = model.freedom.following(q, places)
+        ways = model.independent_speeds.following(q, places)
         u = u + ways @ (linear.state.u[places] - u[places])
     return q, u

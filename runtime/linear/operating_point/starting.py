@@ -34,7 +34,7 @@ def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
     """
     if linear.at_speeds is None or not len(linear):
         return
-    speeds = initial_state(linear.model)[1][list(linear.free)]
+    speeds = initial_state(linear.model)[1][list(linear.free_speed_indices)]
     if not speeds.any():
         return
     plain = replace(linear, carrying=None)
@@ -43,7 +43,9 @@ def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
         if not speeds.any() or not _matter(plain, speeds):
             return
     moving = np.flatnonzero(np.abs(speeds) > _ROUNDING * np.abs(speeds).max())
-    names = abbreviate_names([linear.model.layout.u_name(linear.free[k]) for k in moving])
+    names = abbreviate_names(
+        [linear.model.coordinate_layout.u_name(linear.free_speed_indices[k]) for k in moving]
+    )
     yield information(
         "start-at-speed", names,
         f"the scene starts with speeds ({names}) that last, but this model is that at rest, "
@@ -55,7 +57,7 @@ def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
 
 def _fastest(linear: LinearEquations, speeds: Array) -> float:
     """Largest of the speeds (n,), in characteristic scales per second."""
-    return float(np.abs(speeds / speed_scales(linear.model)[list(linear.free)]).max())
+    return float(np.abs(speeds / speed_scales(linear.model)[list(linear.free_speed_indices)]).max())
 
 
 def _lasting(linear: LinearEquations, speeds: Array) -> Array:
@@ -73,10 +75,10 @@ def _matter(linear: LinearEquations, speeds: Array) -> bool:
     """Whether the matrices at these speeds (n,) differ from those at rest."""
     assert linear.at_speeds is not None
     try:
-        beside = linear.at_speeds(linear.state.u + linear.spread(speeds))
+        beside = linear.at_speeds(linear.state.u + linear.expand(speeds))
     except NumericalFailure:
         return True
-    if not beside.has_stiffness or beside.free != linear.free:
+    if not beside.has_stiffness or beside.free_speed_indices != linear.free_speed_indices:
         return True
     fastest, scale = _fastest(linear, speeds), np.sqrt(linear.M.diagonal())
     pairs = ((linear.C, beside.C, fastest), (linear.K, beside.K, fastest**2))

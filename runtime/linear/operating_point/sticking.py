@@ -47,7 +47,7 @@ def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
     amplitudes = _stuck_below(linear, left)
     sizes = speed_scales(linear.model)[[one.speed for one in left]]
     order = np.argsort(-amplitudes / sizes, kind="stable")
-    layout, worst = linear.model.layout, int(order[0])
+    layout, worst = linear.model.coordinate_layout, int(order[0])
     listed = [
         _sentence(layout.u_name(left[k].speed), _unit(linear, left[k].speed),
                   float(amplitudes[k]), left[k].static)
@@ -61,7 +61,7 @@ def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
         f"hinge sticks: {'; '.join(listed)}{f'; and {more} more' if more > 0 else ''}",
         "give friction, an amplitude of speed at which it counts as viscous damping of equal work",
         float(amplitudes[worst]), _SMALL * float(sizes[worst]), _unit(linear, left[worst].speed),
-        doubt=bool(amplitudes[worst] > _SMALL * sizes[worst]),
+        invalidates=bool(amplitudes[worst] > _SMALL * sizes[worst]),
     )  # fmt: skip
 
 
@@ -85,10 +85,14 @@ class Ways:
 
 def ways_of(linear: LinearEquations) -> Ways:
     """Independent motions of x; for a rotor in axes that rotate with it."""
-    plain, free, loops = replace(linear, carrying=None), list(linear.free), linear.mechanism
+    plain, free, loops = (
+        replace(linear, carrying=None),
+        list(linear.free_speed_indices),
+        linear.constrained_motion,
+    )
     return Ways(
-        linear.coordinates, linear.units, speed_scales(linear.model)[free], plain.spread,
-        lambda efforts: efforts[free] if loops is None else loops.ways.T @ efforts,
+        linear.coordinate_names, linear.coordinate_units, speed_scales(linear.model)[free],
+        plain.expand, lambda efforts: efforts[free] if loops is None else loops.ways.T @ efforts,
     )  # fmt: skip
 
 
@@ -128,7 +132,7 @@ def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float]
     and its opposite; at 0, between an acceleration of one scale/s^2 and none.  If coordinates are
     moved individually, the result (1, n) has only the effort of each along itself.
     """
-    tree, state, memory = linear.tree, linear.state, linear.tree.start_memory()
+    tree, state, memory = linear.open_tree, linear.state, linear.open_tree.start_memory()
 
     def efforts(u: Array, a: Array) -> Array:
         return tree.inverse_dynamics(state.t, state.q, u, a, memory)
@@ -137,8 +141,8 @@ def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float]
         step = ways.along(row * ways.sizes)
         if speed:
             step = speed * step
-            return efforts(state.u + step, state.a) - efforts(state.u - step, state.a)
-        return efforts(state.u, state.a + step) - efforts(state.u, state.a)
+            return efforts(state.u + step, state.udot) - efforts(state.u - step, state.udot)
+        return efforts(state.u, state.udot + step) - efforts(state.u, state.udot)
 
     def work(speed: float) -> Array:
         found = np.array([ways.onto(one(speed, row)) for row in signs]) * signs
@@ -179,7 +183,7 @@ def _sentence(name: str, unit: str, amplitude: float, static: float) -> str:
 
 
 def _unit(linear: LinearEquations, speed: int) -> str:
-    slots = linear.model.layout.hinge_of_speed(speed)
+    slots = linear.model.coordinate_layout.hinge_of_speed(speed)
     return slots.u_units[speed - slots.u].removesuffix("/s")
 
 
@@ -191,13 +195,13 @@ def _stuck_below(linear: LinearEquations, left: list[Rubbing]) -> Array:
     ways = np.zeros((len(left), len(linear)))
     if not linear.has_stiffness:
         return np.full(len(left), np.inf)
-    if linear.mechanism is not None:
-        ways = linear.mechanism.ways[[one.speed for one in left]]
+    if linear.constrained_motion is not None:
+        ways = linear.constrained_motion.ways[[one.speed for one in left]]
     else:
-        places = {speed: k for k, speed in enumerate(linear.free)}
+        places = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
         for row, one in zip(ways, left, strict=True):
             row[places[one.speed]] = 1.0
-    sizes = speed_scales(linear.model)[list(linear.free)]
+    sizes = speed_scales(linear.model)[list(linear.free_speed_indices)]
     stiffness, rows = linear.K * np.outer(sizes, sizes), ways * sizes
     moved = lstsq(stiffness, rows.T, cond=_SOFT, lapack_driver="gelsy")[0]
     missing = np.abs(stiffness @ moved - rows.T).max(axis=0, initial=0.0)

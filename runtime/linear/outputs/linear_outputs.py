@@ -41,7 +41,7 @@ def outputs_of(linear: LinearEquations, names: Sequence[str] | None) -> list[Lin
     if names is not None:
         return [one for name in names_of("outputs", names) for one in shown.named(name)]
     of_scene = [one for output in linear.model.scene.output for one in shown.given(output)]
-    return of_scene or [shown.sight.get(name) for name in linear.coordinates]
+    return of_scene or [shown.sight.get(name) for name in linear.coordinate_names]
 
 
 def read_by(linear: LinearEquations, names: Sequence[str] | None) -> list[str]:
@@ -131,7 +131,7 @@ def rows_of(
     orders = {part.order: np.zeros(shape) for _, part in parts}
     reach = [part.push for _, part in parts if part.push is not None]
     distinct = {one: k for k, one in enumerate(dict.fromkeys(reach))}
-    reached = columns(linear.tree, linear.state, list(distinct), list(range(nu)))
+    reached = columns(linear.open_tree, linear.state, list(distinct), list(range(nu)))
     for k, part in parts:
         row = orders[part.order][k]
         if part.push is not None:
@@ -144,22 +144,25 @@ def rows_of(
         for name, slope in one.through:
             if name in places:
                 through[k, places[name]] += slope
-    if linear.mechanism is not None:
-        drives = {speed for one in pushes for speed, _ in one.moves} | {*linear.drives}
-        orders = linear.mechanism.rows(linear.state, orders, drives)
+    if linear.constrained_motion is not None:
+        drives = {speed for one in pushes for speed, _ in one.moves} | {*linear.drive_indices}
+        orders = linear.constrained_motion.rows(linear.state, orders, drives)
     orders = _with_turning(linear, orders)
     if linear.carrying is not None:
-        orders = linear.carrying.rows(orders, list(linear.free))
+        orders = linear.carrying.rows(orders, list(linear.free_speed_indices))
     return Rows(orders, through)
 
 
 def _with_turning(linear: LinearEquations, orders: dict[int, Array]) -> dict[int, Array]:
     """Rows of x from rows of speeds, where x' = G x + du: du = x' - G x, da = x'' - G x'."""
-    if linear.turning is None:
+    if linear.rate_matrix is None:
         return orders
-    free, found = list(linear.free), {order: rows.copy() for order, rows in orders.items()}
+    free, found = (
+        list(linear.free_speed_indices),
+        {order: rows.copy() for order, rows in orders.items()},
+    )
     for order, rows in orders.items():
         if order:
             lower = found.setdefault(order - 1, np.zeros_like(rows))
-            lower[:, free] -= rows[:, free] @ linear.turning
+            lower[:, free] -= rows[:, free] @ linear.rate_matrix
     return found

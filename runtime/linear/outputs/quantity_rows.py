@@ -47,7 +47,7 @@ class QuantityLookup:
 
     def __init__(self, linear: LinearEquations) -> None:
         self._linear, self._state = linear, linear.state
-        self._model, self._layout = linear.model, linear.model.layout
+        self._model, self._layout = linear.model, linear.model.coordinate_layout
         self._ends = BodyReferences(linear.model.scene.skeleton)
         self._springs = {one.name: k for k, one in enumerate(linear.model.scene.spring)}
 
@@ -64,12 +64,13 @@ class QuantityLookup:
         """
         found = self.find(name)
         if found is None:
-            coordinates = self._linear.coordinates or ("shoulder.angle",)
+            coordinates = self._linear.coordinate_names or ("shoulder.angle",)
             outputs = (one.name for one in self._model.scene.output)
             raise SceneError(
                 f'"{name}": expected a coordinate such as "{coordinates[0]}", its rate, a motion '
                 'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", what a spring '
-                f"does, or an output of the scene{did_you_mean(name, (*outputs, *self.known()))}"
+                f"does, or an output of the "
+                f"scene{did_you_mean(name, (*outputs, *self.known_names()))}"
             )
         return found
 
@@ -89,9 +90,9 @@ class QuantityLookup:
             return self._of_spring(self._springs[owner], last)
         return self._of_end(name, owner, last)
 
-    def known(self) -> Iterator[str]:
+    def known_names(self) -> Iterator[str]:
         """Known names, coordinates first."""
-        yield from self._linear.coordinates
+        yield from self._linear.coordinate_names
         yield from self._model.scene.channels
         yield from (f"{spring}.{kind}" for spring in self._springs for kind in SPRING_QUANTITIES)
         for slots in self._layout.hinges.values():
@@ -117,7 +118,7 @@ class QuantityLookup:
         state = self._state
         for k, speed in enumerate(slots.u_names):
             row, place = ((slots.u + k, 1.0),), slots.u + k
-            if last == f"{speed}_increment" and not slots.straight:
+            if last == f"{speed}_increment" and not slots.rates_are_speeds:
                 unit = slots.u_units[k].removesuffix("/s")
                 return LinearQuantity(f"{slots.name}.{last}", unit, (Part(0, row),), lambda: 0.0)
             if last in _aliases(speed, "u", k, slots.nu):
@@ -126,7 +127,9 @@ class QuantityLookup:
             rate = acceleration_name(speed)
             if last in _aliases(rate, "udot", k, slots.nu):
                 unit, parts = rate_unit(slots.u_units[k]), (Part(2, row),)
-                return LinearQuantity(f"{slots.name}.{rate}", unit, parts, _entry(state.a, place))
+                return LinearQuantity(
+                    f"{slots.name}.{rate}", unit, parts, _entry(state.udot, place)
+                )
         for k, (name, unit) in enumerate(zip(slots.q_names, slots.q_units, strict=True)):
             if last in _aliases(name, "q", k, slots.nq):
                 parts = (Part(0, self._follows(slots, k)),)
@@ -137,7 +140,7 @@ class QuantityLookup:
 
     def _follows(self, slots: HingeSlots, k: int) -> tuple[tuple[int, float], ...]:
         """Row (index, value) of coordinate k of a hinge along its speeds."""
-        if slots.straight:
+        if slots.rates_are_speeds:
             return ((slots.u + k, 1.0),)
         engine, state = self._model.looped, self._state
         found = []
@@ -165,7 +168,7 @@ class QuantityLookup:
 
     def _number(self, end: str, kind: str, axis: int) -> Callable[[], float]:
         column = POINT_COLUMNS[kind].start + axis
-        return lambda: float(self._points([self._model.packed.end(end)])[0, column])
+        return lambda: float(self._points([self._model.packed_scene.end(end)])[0, column])
 
     def _points(self, ends: Sequence[tuple[int, tuple[float, ...], tuple[float, ...]]]) -> Array:
         """Motion (ends, 24) at the operating point; columns of `Observation.points`."""
@@ -206,7 +209,7 @@ class QuantityLookup:
 
     def _motion(self, number: int) -> tuple[float, float]:
         """Length of a spring, m, and its rate, m/s."""
-        near, far = self._points(self._model.packed.system.forces[number].ends)
+        near, far = self._points(self._model.packed_scene.system.forces[number].ends)
         length, rate = length_and_rate((far - near)[None, :6])
         return float(length[0]), float(rate[0])
 

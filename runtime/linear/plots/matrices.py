@@ -27,7 +27,9 @@ def matrices(linear: StateSpace, path: str | Path | None) -> Any:
 
     Each matrix has its own colour scale, logarithmic in both signs.
     """
-    drawn, names = ("MCK", linear.coordinates) if linear.has_stiffness else ("A", linear.states)
+    drawn, names = (
+        ("MCK", linear.coordinate_names) if linear.has_stiffness else ("A", linear.state_names)
+    )
     refuse_none(getattr(linear, drawn[0]))
     named = len(names) <= _NAMED
     side = float(np.clip(0.2 * len(names), 2.4, 6.0)) if named else 4.0
@@ -50,7 +52,7 @@ def _unit(linear: StateSpace, name: str) -> str:
     """Unit of the entries; for coordinates of several units, that of the rows."""
     if name == "A":
         return "rates of rows per column"
-    units = set(linear.units)
+    units = set(linear.coordinate_units)
     if len(units) > 1:
         return "rows in N or N*m"
     per = {"M": "/s^2", "C": "/s", "K": ""}[name]

@@ -52,7 +52,7 @@ def view(
     for k in which:
         shape = shapes[:, k]
         moved = _amplitude(linear, shape, part) * np.exp(1j * np.deg2rad(phases))[:, None] * shape
-        q = np.array([_closed(linear, linear.displaced(x)) for x in np.real(moved)])
+        q = np.array([_closed(linear, linear.displaced_state(x)) for x in np.real(moved)])
         stage = build_scene_graph(_standing(linear, q), title, when=when)
         stage = replace(stage, solids=(*stage.solids, rest), clock=("phase", "deg"))
         parts.append((f"mode {k + 1}, {described(complex(eigenvalues[k]))}", stage))
@@ -63,7 +63,7 @@ def _amplitude(linear: LinearEquations, shape: Array, part: float) -> float:
     """Factor of a shape for visible displacements and limited rotations."""
     both = np.stack([np.real(shape), np.imag(shape)], axis=1)
     found = amplitudes(linear, both, part)
-    turns = np.array([unit == "rad" for unit in linear.units])
+    turns = np.array([unit == "rad" for unit in linear.coordinate_units])
     most = np.abs(shape[turns]).max(initial=0.0)
     usual = float(found[found > 0].min(initial=np.inf))
     if not np.isfinite(usual):
@@ -77,7 +77,7 @@ def _closed(linear: LinearEquations, q: Array) -> Array:
     if closed is None:
         return q
     try:
-        return closed.assembled(q, np.zeros(linear.model.nu), (), ())[0]
+        return closed.assemble(q, np.zeros(linear.model.nu), (), ())[0]
     except SceneError:  # out of reach for the loops: draw the linear displacement
         return q
 

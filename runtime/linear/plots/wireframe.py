@@ -93,7 +93,7 @@ def _near(
 
     A scale factor enlarges the largest displacement to `part` times the size of the scene.
     """
-    states = [linear.state.q, *(linear.displaced(x) for x in (shapes * steps).T)]
+    states = [linear.state.q, *(linear.displaced_state(x) for x in (shapes * steps).T)]
     rest, *near = outlines(linear, np.array(states))
     size = float(np.linalg.norm(np.ptp(rest.points, axis=0)))
     largest = [float(np.linalg.norm(one.points - rest.points, axis=1).max()) for one in near]
@@ -138,7 +138,7 @@ class _Sight:
         return self._observed([Probe(*self.packed.end(one)) for one in references])
 
     def _observed(self, probes: list[Probe]) -> Array:
-        engine, q = self.model.looped.inertia_alone, self.q
+        engine, q = self.model.looped.inertia_only, self.q
         memory = np.tile(engine.start_memory(), (len(q), 1))
         still = np.zeros((len(q), engine.nu))
         seen = engine.observe(np.zeros(len(q)), q, still, memory, probes, parts=("points",))
@@ -147,7 +147,7 @@ class _Sight:
     def bodies(self) -> Iterator[Array]:
         """Lines (n, m, 3) of bodies, and lines from inboard to outboard ends of hinges."""
         for name in self.names:
-            flexible = self.model.flexible.get(name)
+            flexible = self.model.flexible_bodies.get(name)
             if flexible is not None and flexible.shapes is not None:
                 yield self._axis(name)
             else:
@@ -174,8 +174,8 @@ class _Sight:
 
     def _axis(self, name: str) -> Array:
         """Deflected axis (n, m, 3) of a beam."""
-        pose, body = self.at[name], self.model.flexible[name]
-        eta = self.q[:, self.model.layout.modal[name].q_slice]
+        pose, body = self.at[name], self.model.flexible_bodies[name]
+        eta = self.q[:, self.model.coordinate_layout.modal[name].q_slice]
         none, still = np.zeros_like(eta), np.zeros((len(eta), 3))
         motion = observe.Motion(
             body, np.zeros(len(eta)), eta, none, none, pose[:, 0:3],
@@ -195,7 +195,7 @@ class _Sight:
 
     def ground(self) -> Array:
         """Positions (k, 3) of hinges that constrain bodies to the ground."""
-        slots = self.model.layout.hinges
+        slots = self.model.coordinate_layout.hinges
         places = [
             hinge.position for hinge in self.hinges
             if hinge.inboard == "ground" and slots[hinge.name].nu < _FREE

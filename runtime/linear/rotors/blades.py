@@ -92,7 +92,7 @@ def find_blades(linear: LinearEquations) -> list[Blades]:
 def _branch(linear: LinearEquations, packed: PackedScene, root: int) -> _Branch:
     """Branch outboard from body `root`; its form lists hinges and free perturbations in order."""
     bodies, coordinates, form = [], list[int](), list[object]()
-    places = {speed: k for k, speed in enumerate(linear.free)}
+    places = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
     for place in _outwards(packed, root):
         bodies.append(place)
         body, hinge = packed.topology.at(place)

@@ -32,7 +32,7 @@ def displacements(linear: LinearEquations, state: State) -> Array:
     velocity.  Rotations are multiplied by the characteristic length of the scene.
     """
     length = scene_length(linear.model)
-    points = _points(linear, state, linear.spread(np.eye(len(linear))).T)
+    points = _points(linear, state, linear.expand(np.eye(len(linear))).T)
     place, velocity, spin = (points[..., POINT_COLUMNS[kind]] for kind in _KINDS)
     centre = state.t * _drift(linear)
     found = np.concatenate([velocity + np.cross(spin, centre - place), length * spin], axis=1)
@@ -82,8 +82,8 @@ def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
 
     The points are the frames of all bodies, the ends of flexible bodies and the sections of beams.
     """
-    packed, engine = linear.model.looped.packed, linear.model.looped.inertia_alone
-    bodies, flexible = linear.model.scene.skeleton.bodies, linear.model.flexible
+    packed, engine = linear.model.looped.packed, linear.model.looped.inertia_only
+    bodies, flexible = linear.model.scene.skeleton.bodies, linear.model.flexible_bodies
     names = [bodies.name(k) for k in range(len(bodies))]
     probes = [Probe(*packed.end(name)) for name in names]
     for name in flexible:
@@ -94,7 +94,7 @@ def _points(linear: LinearEquations, state: State, speeds: Array) -> Array:
     points = engine.observe(*of, memory, probes, parts=("points",)).points
     beams = _beams(linear)
     frames = [points[:, names.index(name)] for name in beams]
-    slots = [linear.model.layout.modal[name].u_slice for name in beams]
+    slots = [linear.model.coordinate_layout.modal[name].u_slice for name in beams]
     along = [_sections(body, frame, speeds[:, place])
              for body, frame, place in zip(beams.values(), frames, slots, strict=True)]  # fmt: skip
     return np.concatenate([points, *along], axis=1)
@@ -104,7 +104,7 @@ def _bodies_of_points(linear: LinearEquations) -> list[int]:
     """Tree indices of the bodies of all `_points`."""
     end, bodies = linear.model.looped.packed.end, linear.model.scene.skeleton.bodies
     found = [end(bodies.name(k))[0] for k in range(len(bodies))]
-    for name in linear.model.flexible:
+    for name in linear.model.flexible_bodies:
         found += [end(name)[0]] * len(bodies.ends(name) or ())
     for name, body in _beams(linear).items():
         found += [end(name)[0]] * len(_stations(body))
@@ -112,7 +112,7 @@ def _bodies_of_points(linear: LinearEquations) -> list[int]:
 
 
 def _beams(linear: LinearEquations) -> dict[str, ModalBody]:
-    flexible = linear.model.flexible
+    flexible = linear.model.flexible_bodies
     return {name: body for name, body in flexible.items() if body.shapes is not None}
 
 

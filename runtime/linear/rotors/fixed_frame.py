@@ -85,7 +85,7 @@ def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -
     found = np.linalg.lstsq(unit, then, rcond=None)[0]
     left = np.abs(unit @ found - then).max(axis=0) / np.linalg.norm(then, axis=0)
     if (left > _ALIKE).any():
-        names = [linear.coordinates[k] for k in others[left > _ALIKE]]
+        names = [linear.coordinate_names[k] for k in others[left > _ALIKE]]
         raise _no_frame(f"what {abbreviate_names(names)} displaces changes its shape as it turns")
     return np.asarray(found / size[:, None])
 
@@ -103,7 +103,7 @@ def _refuse_asymmetric(linear: LinearEquations) -> None:
         allowed = SAME * np.sqrt(np.outer(rows, rows)) + _ROUNDING * max(rows.max(), floor)
         wrong = np.abs(one - other) > allowed
         if wrong.any():
-            names = [linear.coordinates[k] for k in np.flatnonzero(wrong.any(axis=0))]
+            names = [linear.coordinate_names[k] for k in np.flatnonzero(wrong.any(axis=0))]
             raise _no_frame(f"{_NAMES[name]} of {abbreviate_names(names)} changes as it turns")
 
 

@@ -24,14 +24,19 @@ _AHEAD = 0.1
 
 def later(linear: LinearEquations) -> LinearEquations:
     """Linear equations at the later state of the motion."""
-    state, loops = ahead(linear), linear.mechanism
+    state, loops = ahead(linear), linear.constrained_motion
     loops = None if loops is None else loops.at(state)
-    turning = linear.turning if loops is None else loops.turning
+    turning = linear.rate_matrix if loops is None else loops.turning
     carrying = linear.carrying
     if carrying is not None:
         carrying = carrying.later(state.t - linear.state.t)
     return replace(
-        linear, state=state, about=None, mechanism=loops, turning=turning, carrying=carrying
+        linear,
+        state=state,
+        compiled_state=None,
+        constrained_motion=loops,
+        rate_matrix=turning,
+        carrying=carrying,
     )
 
 
@@ -41,7 +46,7 @@ def ahead(linear: LinearEquations) -> State:
     engine, memory = model.looped, model.looped.start_memory()
     dt = _AHEAD / float(np.abs(state.u).max())
     rates = engine.rates(state.t, state.q, state.u, memory)
-    quaternions = [int(k) for group in model.layout.groups for k in group.quaternions()]
+    quaternions = [int(k) for group in model.coordinate_layout.groups for k in group.quaternions()]
     q = move_steadily(state.q, rates, dt, quaternions)
     whole = SceneSystem(engine).start(state.t + dt, q, state.u)
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]

@@ -32,22 +32,22 @@ class UnbalanceResponse(AssessedAnswer):
     """Whirl of points due to an unbalance m e that rotates with a body, in the fixed frame.
 
     Attributes:
-        parameter, values: the parameter and its values (m,).
+        parameter_name, parameter_values: the parameter and its values (m,).
         spin: (m,) spin speed of the body and frequency of the whirl, rad/s.
         at, unbalance: end with the unbalance, and m e in kg m.
-        points: names of the observed ends.
+        end_names: names of the observed ends.
         displacements: (m, points, 3) complex, m, inertial axes: the motion is the real part of
             displacements * exp(i spin t); the unbalance rotates from the first of `directions`
             towards the second.
         directions: (2, 3) unit vectors normal to the spin axis.
     """
 
-    parameter: str
-    values: Array = field(repr=False)
+    parameter_name: str
+    parameter_values: Array = field(repr=False)
     spin: Array = field(repr=False)
     at: str
     unbalance: float
-    points: tuple[str, ...]
+    end_names: tuple[str, ...]
     displacements: Complex = field(repr=False)
     directions: Array = field(repr=False)
     findings: Iterable[Risk] = field(default=(), repr=False)
@@ -75,9 +75,9 @@ class UnbalanceResponse(AssessedAnswer):
         """
         from ..plots.bode_and_locus import unbalance
 
-        return unbalance(self.spin, self.amplitude, self.points, path)
+        return unbalance(self.spin, self.amplitude, self.end_names, path)
 
-    def to_dataset(self) -> Any:
+    def to_xarray(self) -> Any:
         """`xarray.Dataset` with displacements split into real and imaginary parts.
 
         Raises EnvironmentFailure without the extra.
@@ -89,20 +89,26 @@ class UnbalanceResponse(AssessedAnswer):
             "minor_axis": (along[:2], self.minor_axis, {"units": "m"}),
             "real": (along, self.displacements.real), "imag": (along, self.displacements.imag),
         }  # fmt: skip
-        coords = {"value": self.values, "point": list(self.points), "axis": ["x", "y", "z"]}
-        about = {"parameter": self.parameter, "at": self.at, "unbalance": self.unbalance}
+        coords = {
+            "value": self.parameter_values,
+            "point": list(self.end_names),
+            "axis": ["x", "y", "z"],
+        }
+        about = {"parameter": self.parameter_name, "at": self.at, "unbalance": self.unbalance}
         return file_formats.xarray().Dataset(arrays, coords, about)
 
     def _rows(self) -> Iterator[tuple[str, ...]]:
         """Header, then one row of text for each value of the parameter."""
         kinds = ("amplitude [m]", "minor axis [m]")
         yield (
-            self.parameter,
+            self.parameter_name,
             "spin [rad/s]",
-            *(f"{p} {kind}" for p in self.points for kind in kinds),
+            *(f"{p} {kind}" for p in self.end_names for kind in kinds),
         )
-        both = np.stack([self.amplitude, self.minor_axis], axis=2).reshape(len(self.values), -1)
-        for value, spin, row in zip(self.values, self.spin, both, strict=True):
+        both = np.stack([self.amplitude, self.minor_axis], axis=2).reshape(
+            len(self.parameter_values), -1
+        )
+        for value, spin, row in zip(self.parameter_values, self.spin, both, strict=True):
             yield tuple(repr(float(x)) for x in (value, spin, *row))
 
     def save(self, path: str | Path) -> Path:
@@ -110,7 +116,7 @@ class UnbalanceResponse(AssessedAnswer):
 
         Raises SceneError for another file extension, EnvironmentFailure without the extra.
         """
-        return file_formats.save(path, self.to_dataset, self._rows())
+        return file_formats.save(path, self.to_xarray, self._rows())
 
 
 def unbalance_response(
@@ -184,4 +190,4 @@ def _whirl(
     if response is None:
         return np.zeros((count, 3), dtype=np.complex128)
     force = spin**2 * (unbalance[0] - 1j * unbalance[1])
-    return np.asarray((response.values[0] @ force).reshape(count, 3))
+    return np.asarray((response.response[0] @ force).reshape(count, 3))

@@ -134,7 +134,7 @@ class ToleranceRun:
         rtol: its relative tolerance.
         kind: kind of its method; of several methods explicit if all are.
         method: name of its method.
-        apart: distance to the tightest run; 0 for that one, inf for other end times.
+        distance: distance to the tightest run; 0 for that one, inf for other end times.
         summed: sum of its local errors; None if the method computes none.
         held: whether stability, not accuracy, limited many of its steps.
         growth: error relative to the sum of local errors, where it is better known than typically.
@@ -145,7 +145,7 @@ class ToleranceRun:
 
     rtol: float
     kind: Kind
-    apart: float
+    distance: float
     summed: float | None
     held: bool = False
     radians: float = 0.0
@@ -154,13 +154,13 @@ class ToleranceRun:
     parted: float = 1.0
     method: str = ""
 
-    def seen(self, distances: Array) -> ToleranceRun:
+    def compared_with(self, distances: Array) -> ToleranceRun:
         """Run with its distances (n,) to the tightest one; empty for another end time."""
         if not len(distances):
-            return replace(self, apart=math.inf)
+            return replace(self, distance=math.inf)
         diverged = np.flatnonzero(~(distances < _PARAMETERS[self.kind].divergence))
         parted = float(diverged[0]) / max(len(distances) - 1, 1) if len(diverged) else 1.0
-        return replace(self, apart=float(distances.max()), parted=parted)
+        return replace(self, distance=float(distances.max()), parted=parted)
 
 
 def first_rtol(target: float, kind: Kind, radians: float = 0.0) -> float:
@@ -186,8 +186,8 @@ def estimate_error(runs: Sequence[ToleranceRun]) -> float | None:
     before, last = runs[-2:]
     reduction = (last.rtol / before.rtol) ** _error_power(runs) if last.rtol < before.rtol else 1.0
     parameters = _PARAMETERS[last.kind]
-    error = parameters.safety * before.apart * (_TWO_RUN_FACTOR if len(runs) == 2 else 1.0)
-    if before.apart < parameters.divergence:
+    error = parameters.safety * before.distance * (_TWO_RUN_FACTOR if len(runs) == 2 else 1.0)
+    if before.distance < parameters.divergence:
         is_constant = last.calm and before.calm and last.rtol >= 0.99 * _MIN_CALM_STEP * before.rtol
         return error * (1.0 if is_constant else reduction)
     if before.kind is last.kind is Kind.EXPLICIT and _LATE_DIVERGENCE <= before.parted < 1.0:
@@ -206,7 +206,7 @@ def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
     if error is None or (runs[-2].kind, runs[-2].method) != (kind, last.method):
         factor, tightest = _factor_by_local_errors(last, target), min(_ROUNDING, last.rtol / 2)
         max_factor = _MAX_FIRST_STEP
-    elif not runs[-2].apart < _PARAMETERS[kind].divergence:
+    elif not runs[-2].distance < _PARAMETERS[kind].divergence:
         factor = _MAX_DIVERGED_STEP
         if kind is Kind.EXPLICIT and runs[-2].parted < 1.0:
             factor = min(
@@ -267,7 +267,7 @@ def _rtol_of_other_kind(
 def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
     """Reason that no tolerance helps, or ""."""
     is_constant = len(runs) > 3 and not _error_decreases(runs) and not _error_decreases(runs[:-1])
-    is_constant = is_constant and runs[-2].apart < _PARAMETERS[runs[-1].kind].divergence
+    is_constant = is_constant and runs[-2].distance < _PARAMETERS[runs[-1].kind].divergence
     if is_constant and runs[-1].rtol < _SLOW_DECAY_RTOL:
         return (
             "the error no longer decreases with the tolerance (rounding, or jumps of forces within "
@@ -311,9 +311,9 @@ def _observed_power(runs: Sequence[ToleranceRun]) -> float | None:
     a, b, last = runs[-3:]
     if not a.kind is b.kind is last.kind or not a.method == b.method == last.method:
         return None
-    if not 0 < b.apart < math.inf or not 0 < a.apart < math.inf:
+    if not 0 < b.distance < math.inf or not 0 < a.distance < math.inf:
         return None
     divergence = _PARAMETERS[last.kind].divergence
-    if a.apart > divergence:
-        return None if b.apart < divergence else 0.0
-    return math.log(a.apart / b.apart) / math.log(a.rtol / b.rtol)
+    if a.distance > divergence:
+        return None if b.distance < divergence else 0.0
+    return math.log(a.distance / b.distance) / math.log(a.rtol / b.rtol)

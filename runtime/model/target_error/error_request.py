@@ -34,7 +34,7 @@ class Control:
     rtol: float | None
     atol: float | None
 
-    def filled(self) -> tuple[str, float, float]:
+    def with_defaults(self) -> tuple[str, float, float]:
         """Method, relative and absolute tolerance, with defaults where not given."""
         default_method = AUTO if self.step is None else METHOD
         return (

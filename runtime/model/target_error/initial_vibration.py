@@ -140,8 +140,8 @@ def initial_vibration(
         np.abs(vectors[:, fast] * participations[fast]),
     )
     amplitudes /= fast_rates
-    q_parts = _relative_amplitudes(amplitudes[: len(q)], model.layout.q_by_unit)
-    u_parts = _relative_amplitudes(amplitudes[len(q) :], model.layout.u_by_unit)
+    q_parts = _relative_amplitudes(amplitudes[: len(q)], model.coordinate_layout.q_by_unit)
+    u_parts = _relative_amplitudes(amplitudes[len(q) :], model.coordinate_layout.u_by_unit)
     dampings = np.maximum(-roots[fast].real, 0.0) / fast_rates
     return Vibration(rate, span, fast_rates, dampings, q_parts, u_parts)
 

@@ -134,7 +134,9 @@ def damps_own_errors(run: Trajectory) -> bool:
 def _fastest_possible(model: CompiledScene) -> float:
     """Upper bound of |lambda| (1/s) of all motions of a scene; cached."""
     if model not in _fastest_rates:
-        squares = [squared_frequencies(body).max(initial=0.0) for body in model.flexible.values()]
+        squares = [
+            squared_frequencies(body).max(initial=0.0) for body in model.flexible_bodies.values()
+        ]
         shape_rate = _FREE_SHAPE_FACTOR * math.sqrt(max(squares, default=0.0))
         _fastest_rates[model] = max(shape_rate, fastest_possible(model.scene))
     return _fastest_rates[model]
@@ -251,7 +253,7 @@ class Family:
 
     def _explicit_steps(self, rtol: float, made: Sequence[Trajectory]) -> float:
         """Estimated number of explicit steps of a run."""
-        rate = max([0.0, *(use.rate or 0.0 for run in made for use in run.methods)])
+        rate = max([0.0, *(use.fastest_rate or 0.0 for run in made for use in run.methods)])
         radians = max(self._fastest_radians, rate * self._span)
         resolved = radians if self._vibration is None else self._vibration.speeding(rtol)
         return max(

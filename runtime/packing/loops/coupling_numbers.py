@@ -122,7 +122,7 @@ class _Rows:
         """Rates of a hinge's coordinates as functions of its coordinates and speeds."""
         graph = self.graph
         speeds = [graph.element("u", slots.u + i) for i in range(slots.nu)]
-        if slots.straight:
+        if slots.rates_are_speeds:
             return speeds
         facts = self.scene.hinges.by_name[slots.name].facts
         if facts is None or facts.rates is None:

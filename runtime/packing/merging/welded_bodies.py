@@ -36,9 +36,9 @@ class WeldedBodies:
     poses: Mapping[int, Pose] = field(default_factory=dict)
     welds: Mapping[int, int] = field(default_factory=dict)
 
-    def placed(self, body: int, whole: Placement) -> Placement:
+    def pose_in_carrier(self, body: int, whole: Placement) -> Placement:
         """Internal frame `whole` of the carrier in the axes of a merged body."""
-        pose = self.poses[body].inverse.then(Pose(whole.origin, whole.rotation))
+        pose = self.poses[body].inverse.compose(Pose(whole.origin, whole.rotation))
         return Placement(pose.rotation, pose.position)
 
     @cached_property
@@ -49,7 +49,7 @@ class WeldedBodies:
             parts.setdefault(carrier, []).append(body)
         return parts
 
-    def told(self, scene: Scene) -> Iterator[Simplification]:
+    def simplifications(self, scene: Scene) -> Iterator[Simplification]:
         """Records of all merged bodies."""
         for body, carrier in self.by.items():
             weld, name = scene.hinge[self.welds[body]], scene.body[body].name
@@ -80,7 +80,7 @@ def find_welded_bodies(expanded: ExpandedScene, tree: Topology) -> WeldedBodies:
         if weld.name in referenced_hinges or not are_rigid:
             continue
         pose = weld_pose(weld, inboard, body)
-        poses[run.body] = poses[run.on].then(pose) if run.on in poses else pose
+        poses[run.body] = poses[run.on].compose(pose) if run.on in poses else pose
         by[run.body], welds[run.body] = by.get(run.on, run.on), run.hinge
     return WeldedBodies(by, poses, welds)
 
@@ -91,7 +91,7 @@ def _is_welded(run: BodyRow, expanded: ExpandedScene) -> bool:
     if run.hinge >= user_hinges or not 0 <= run.on < len(scene.body):
         return False
     hinge = scene.hinge[run.hinge]
-    return hinge.is_weld and not hinge.lets_go
+    return hinge.is_weld and not hinge.is_released
 
 
 def _is_rigid(body: Body, expanded: ExpandedScene) -> bool:

@@ -79,7 +79,9 @@ def write_model(system: System, elements: Elements) -> Written:
         _fill_force(record, force, elements, memory)
         record.own = int(is_own)
     model.forces, model.n_forces = forces, len(system.forces)
-    model.needs_pose = int(bool(system.forces or system.loads or system.dragged or system.closes))
+    model.needs_pose = int(
+        bool(system.forces or system.loads or system.bodies_with_drag or system.closes)
+    )
     model.inputs = write_inputs(system.inputs, system.held.places, memory)
     model.n_inputs = len(system.inputs)
     model.n_values, model.value_tape = system.n_values, memory.expression(system.values)

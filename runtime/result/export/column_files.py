@@ -43,9 +43,9 @@ class _NotInColumnsError(SceneError, AttributeError):
 class ColumnFile:
     """Result that was saved without its scene: columns by name.
 
-    `t` (n,) in s and `event` (n,) are as in `Result`, and so are `names`, `quantity`, `plot`,
-    `table` and `save` (".csv", ".mat"). All other attributes of a `Result` raise SceneError, with a
-    remedy.
+    `t` (n,) in s and `event` (n,) are as in `Result`, and so are `quantity_names`, `quantity`,
+    `plot`, `table` and `save` (".csv", ".mat"). All other attributes of a `Result` raise
+    SceneError, with a remedy.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class ColumnFile:
         #: Further attributes of a `Result`, not available here.
         self.lost: frozenset[str] = frozenset()
 
-    def names(self) -> tuple[str, ...]:
+    def quantity_names(self) -> tuple[str, ...]:
         """All names that `quantity` accepts."""
         return tuple(self._columns)
 
@@ -90,7 +90,7 @@ class ColumnFile:
         hint = did_you_mean(name, self._columns)
         raise SceneError(f'"{name}": there is no such column in {self.path}{hint}')
 
-    def candidates(self) -> list[Candidate]:
+    def default_quantities(self) -> list[Candidate]:
         """Columns with a rate; without any, all angles and lengths, or all columns."""
         coordinates = [name for name in self._columns if f"{name}_rate" in self._columns]
         lengths = [name for name, (unit, _) in self._columns.items() if unit in ("rad", "m")]

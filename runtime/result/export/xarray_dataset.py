@@ -81,7 +81,7 @@ def _common_unit(units: list[str]) -> str:
 
 
 def _dimension_labels(result: Record) -> dict[str, Variable]:
-    layout = result.model.layout
+    layout = result.model.coordinate_layout
     owners = list(layout.owners)
     q_units = [unit or "1" for h in owners for unit in h.q_units]
     u_units = [unit or "1" for h in owners for unit in h.u_units]
@@ -107,7 +107,7 @@ def _dimension_labels(result: Record) -> dict[str, Variable]:
 
 
 def _state_variables(result: Record) -> dict[str, Variable]:
-    owners = list(result.model.layout.owners)
+    owners = list(result.model.coordinate_layout.owners)
     q_units = [unit for h in owners for unit in h.q_units]
     u_units = [unit for h in owners for unit in h.u_units]
     by_speed, efforts = ("time", "speed"), [effort_unit(unit) for unit in u_units]
@@ -156,7 +156,7 @@ def _body_variables(result: Record) -> dict[str, Variable]:
 
 
 def _hinge_variables(result: Record) -> dict[str, Variable]:
-    names = list(result.model.layout.hinges)
+    names = list(result.model.coordinate_layout.hinges)
     result_variables: dict[str, Variable] = {}
     for kind, description in HINGE_QUANTITIES.items():
         columns = [result._quantities.of_hinge(name, kind) for name in names]
@@ -210,7 +210,9 @@ def _element_variables(result: Record) -> dict[str, Variable]:
             for name in owners_by_word[word]
         ]
         dims = ("time", word, *(_DIMENSIONS[first.labels] if first.labels else ()))
-        description = _attributes(_common_unit([x.unit for x in quantities.values()]), first.what)
+        description = _attributes(
+            _common_unit([x.unit for x in quantities.values()]), first.description
+        )
         result_variables[f"{word}_{kind}"] = (dims, np.stack(columns, axis=1), description)
     return result_variables
 

@@ -29,7 +29,7 @@ class FlexibleBodies:
 
     def __init__(self, model: CompiledScene, observed: Observations) -> None:
         self.model, self.observed, self.run = model, observed, observed.run
-        self.known: Mapping[str, ModalBody] = model.flexible
+        self.known: Mapping[str, ModalBody] = model.flexible_bodies
         self.one_way: Collection[str] = ()  # one-way bodies, not part of the run
         self.unbalanced: Collection[str] = ()  # their end loads omit their vibration
         self._motions: dict[str, Motion] = {}
@@ -54,7 +54,7 @@ class FlexibleBodies:
         """Motion of one flexible body."""
         if name not in self._motions:
             body = self.body(name, what)
-            slots = self.model.layout.modal[name]
+            slots = self.model.coordinate_layout.modal[name]
             points = self.observed.points(name)
             self._motions[name] = Motion(
                 body, self.run.t, self.run.q[:, slots.q_slice], self.run.u[:, slots.u_slice],

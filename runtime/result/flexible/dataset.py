@@ -27,7 +27,7 @@ _MAX_WRITTEN_BODIES = 40
 
 def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
     """Map from name to (dimension, labels, long name)."""
-    bodies = result.model.flexible
+    bodies = result.model.flexible_bodies
     if not bodies:
         return {}
     modes = [f"{name}.{mode}" for name, body in bodies.items() for mode in body.modes]
@@ -39,7 +39,7 @@ def labels(result: Record) -> dict[str, tuple[str, list[str], str]]:
 
 def variables(result: Record) -> dict[str, Variable]:
     """Modal energies, equivalent motions of flexible bodies, and shape functions of beams."""
-    bodies = result.model.flexible
+    bodies = result.model.flexible_bodies
     if not bodies:
         return {}
     dataset_variables: dict[str, Variable] = {

@@ -39,7 +39,7 @@ def participation_by_body(flexible: FlexibleBodies) -> dict[str, Array]:
     try:
         return (
             _loop_participation(flexible, model, q)
-            if model.freedom
+            if model.independent_speeds
             else _tree_participation(flexible, model, q)
         )
     except NumericalFailure:
@@ -63,17 +63,17 @@ def _loop_participation(
     flexible: FlexibleBodies, model: CompiledScene, q: Array
 ) -> dict[str, Array]:
     """Participation by independent motions of loops, which must include every shape function."""
-    assert model.freedom is not None
+    assert model.independent_speeds is not None
     result, shapes = (
         dict[str, Array](),
         {name: _modal_speed_indices(model, name) for name in flexible.known},
     )
     modal_speeds = [k for modes in shapes.values() for k in modes]
-    hinges, free_speeds = model.freedom.settling(q, modal_speeds, (), ())
+    hinges, free_speeds = model.independent_speeds.settling(q, modal_speeds, (), ())
     if not hinges or {*free_speeds} != {*modal_speeds}:
         return {}
     speed_indices, hinge_indices = (*hinges, *modal_speeds), list(range(len(hinges)))
-    motions = model.freedom.following(q, speed_indices)
+    motions = model.independent_speeds.following(q, speed_indices)
     inertia = np.asarray(model.looped.required_by_inertia(q, motions.T) @ motions)
     for name, modes in shapes.items():
         result |= _participation_row(
@@ -93,7 +93,7 @@ def _participation_row(
 
 
 def _modal_speed_indices(model: CompiledScene, name: str) -> list[int]:
-    return list(range(*_bounds(model.layout.modal[name].u_slice)))
+    return list(range(*_bounds(model.coordinate_layout.modal[name].u_slice)))
 
 
 def _participation_of_modes(
@@ -135,7 +135,7 @@ class _Tree:
     """Free speeds of the hinges, and the inboard body of each body."""
 
     def __init__(self, model: CompiledScene) -> None:
-        layout, scene = model.layout, model.scene
+        layout, scene = model.coordinate_layout, model.scene
         self.speeds: dict[str, list[int]] = {}
         self.inboard: dict[str, str] = {}
         for hinge in scene.hinges:

@@ -136,7 +136,7 @@ class FlexibleResults:
             flexible.point_loads(name), flexible.line_loads(name),
         )  # fmt: skip
 
-    def shape(self, body: str, points: int = 41) -> Array:
+    def deflected_shape(self, body: str, points: int = 41) -> Array:
         """Inertial positions (n, points, 3) in m of the deflected axis, evenly spaced."""
         if points < 2:
             raise SceneError(f"shape: points = {points}: expected 2 or more")
@@ -159,11 +159,11 @@ class FlexibleResults:
 
     # --- of any body ----------------------------------------------------------------------------
 
-    def momentum_of(self, body: str) -> Array:
+    def body_momentum(self, body: str) -> Array:
         """Linear momentum (n, 3) in kg*m/s of one body, rigid or flexible."""
         return self._momenta.of(body).linear
 
-    def angular_momentum_of(self, body: str) -> Array:
+    def body_angular_momentum(self, body: str) -> Array:
         """Angular momentum (n, 3) in kg*m2/s of one body about its own mass centre."""
         return self._momenta.of(body).angular
 
@@ -175,7 +175,7 @@ class FlexibleResults:
         """Velocity (n, 3) in m/s of a rigid body of the same mass and momentum, p/m."""
         return self._momenta.of(body).velocity
 
-    def equivalent_spin(self, body: str) -> Array:
+    def equivalent_angular_velocity(self, body: str) -> Array:
         """Angular velocity (n, 3) in rad/s of a rigid body of the same angular momentum.
 
         About the mass centre, with the inertia of the undeformed body in the axes of the floating

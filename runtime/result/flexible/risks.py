@@ -54,7 +54,7 @@ def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
             more = (
                 f" (and {len(kind_risks) - 1} more bodies likewise)" if len(kind_risks) > 1 else ""
             )
-            rows.append(replace(kind_risks[0], means=kind_risks[0].means + more))
+            rows.append(replace(kind_risks[0], description=kind_risks[0].description + more))
     return rows
 
 

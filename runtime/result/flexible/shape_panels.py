@@ -48,7 +48,7 @@ class ShapePanel:
 
 def panel_names(result: Record) -> Iterator[str]:
     """Names of all shape panels of a result."""
-    bodies = result.model.flexible
+    bodies = result.model.flexible_bodies
     if bodies:
         yield "shape"
     for name, body in bodies.items():
@@ -79,7 +79,7 @@ def _drawn_samples(result: Record) -> NDArray[np.int64]:
 
 
 def _strip_panel(result: Record, bodies: list[str] | None) -> ShapePanel:
-    body_names = list(result.model.flexible) if bodies is None else bodies
+    body_names = list(result.model.flexible_bodies) if bodies is None else bodies
     samples = _drawn_samples(result)
     strips = [_body_strip(result, name, samples) for name in body_names[:_MAX_BODIES]]
     rigid = [] if bodies is not None else _rigid_lines(result, samples)
@@ -128,6 +128,6 @@ def _draw_body_deflections(result: Record, name: str, figure: Any, axis: Any) ->
 
 
 def _draw_body_energies(result: Record, name: str, figure: Any, axis: Any) -> None:
-    body = result.model.flexible[name]
+    body = result.model.flexible_bodies[name]
     t, energies = curve(result.t, result.quantity(f"{name}.modal_energy"))
     draw_energies(axis, t, np.maximum(energies, 0.0), body.modes, name)

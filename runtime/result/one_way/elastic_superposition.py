@@ -82,7 +82,7 @@ class Superposition:
         self._sections: dict[tuple[str, str], SmallMotion] = {}
         self._held: dict[str, SmallMotion] = {}
 
-    def moved(self, reference: str) -> Array:
+    def superposed_motion(self, reference: str) -> Array:
         """Motion (n, 24) of "body" or "body.end" including elastic motions inboard of it.
 
         Columns as in `Observations.points`.

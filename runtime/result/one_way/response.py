@@ -137,7 +137,7 @@ def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
 
 def rigidified_bodies(model: CompiledScene) -> RigidSubstitution:
     """Substitution of the bodies that are rigid in a model's runs."""
-    expanded = model.packed.expanded
+    expanded = model.packed_scene.expanded
     assert expanded is not None and expanded.rigidified is not None
     return expanded.rigidified
 
@@ -146,7 +146,7 @@ def _break_times(model: CompiledScene, run: Trajectory) -> Array:
     """Times of the start, the last sample, and possible jumps or narrow features of loads."""
     first, last = run.settings.t_start, float(np.max(run.t, initial=run.settings.t_start))
     events = run.t[np.flatnonzero(run.event)]
-    time_map = model.packed.time_map(first, last)
+    time_map = model.packed_scene.time_map(first, last)
     inner_times = [t for t in (*time_map.breaks, *time_map.starts, *events) if first < t < last]
     times = np.unique([first, *inner_times, last])
     is_distinct = np.diff(times) > _MIN_EDGE_DISTANCE * (

@@ -146,7 +146,7 @@ class _SuperposedObservations(Observations):
     def points(self, reference: str) -> Array:
         """Motion (n, 24) of "body" or "body.end", see `Observation`."""
         if reference not in self._moved:
-            motion = self._superposition.moved(reference)
+            motion = self._superposition.superposed_motion(reference)
             motion.flags.writeable = False
             self._moved[reference] = motion
         return self._moved[reference]

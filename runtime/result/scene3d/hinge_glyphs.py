@@ -42,7 +42,7 @@ def hinge_glyph(hinge: Hinge, r: float) -> Surface | None:
         return box_surface((1.3 * r, 1.3 * r, 1.3 * r))
     axes = np.array(hinge_frames(hinge)[1])
     parts = []
-    if len(facts.turns) == 3 or not facts.steady:
+    if len(facts.turns) == 3 or not facts.constant_subspace:
         parts.append(ellipsoid_surface((r, r, r), 16))
     else:
         parts += [

@@ -70,7 +70,7 @@ class LoadArrows:
         positions = [pose.position]
         if (
             load.force_per_length is not None
-            and split_reference(load.on)[0] in self.run.model.flexible
+            and split_reference(load.on)[0] in self.run.model.flexible_bodies
         ):
             positions = self._along(load, pose)
         return _LoadHistory(load, wrench[:, :3], wrench[:, 3:], positions, pose)
@@ -113,7 +113,7 @@ class LoadArrows:
         for history in self.seen:
             yield f"loads/{history.load.name}", history.pose
 
-    def told(self) -> Iterator[tuple[str, ObjectLabel]]:
+    def label_texts(self) -> Iterator[tuple[str, ObjectLabel]]:
         """Labels of loads on the page."""
         for history in self.seen:
             numbers = [(f"force {x}", "N", v) for x, v in zip("xyz", history.force.T, strict=True)]

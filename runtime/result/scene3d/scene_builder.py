@@ -84,7 +84,7 @@ class _SceneBuilder:
             poses=self.poses, solids=tuple(solids),
             bent=(*self._bent(), *self.acting.bent()),
             lines=(*self._coils(), *self._ways()),
-            told=dict([*self._told(), *self.acting.told()]), notes=self.notes,
+            told=dict([*self._told(), *self.acting.label_texts()]), notes=self.notes,
         )  # fmt: skip
         gravity_objects = gravity_arrow(scene_graph, float(np.linalg.norm(self.scene.gravity)))
         if gravity_objects is None:
@@ -125,7 +125,7 @@ class _SceneBuilder:
         return _BODY_COLOURS[self.names.index(name) % len(_BODY_COLOURS)]
 
     def _rigid(self) -> Iterator[Solid]:
-        flexible_bodies = self.run.model.flexible
+        flexible_bodies = self.run.model.flexible_bodies
         names_with_geometry = {
             name for name, body in flexible_bodies.items() if body.shapes or body.skin
         }
@@ -157,7 +157,7 @@ class _SceneBuilder:
 
     def _bent(self) -> Iterator[DeformingSurface]:
         shaped = {shape.owner for shape in self.scene.shape}
-        for name, body in self.run.model.flexible.items():
+        for name, body in self.run.model.flexible_bodies.items():
             pose, colour = self.poses[f"bodies/{name}"], self._colour(name)
             if body.shapes is not None:
                 yield flexible_geometry.beam_tube(
@@ -244,7 +244,7 @@ class _SceneBuilder:
 
     def _centre(self, name: str, body: Body) -> Array:
         """Label position of a body, in its axes."""
-        flexible_body = self.run.model.flexible.get(name)
+        flexible_body = self.run.model.flexible_bodies.get(name)
         if flexible_body is None or not flexible_body.ports:
             return body_geometry.body_centre(body)
         return np.mean([port.position for port in flexible_body.ports.values()], axis=0)
@@ -255,7 +255,7 @@ class _SceneBuilder:
         for name, body in zip(self.names, self.skeleton.bodies, strict=True):
             text = (
                 (f"mass {body.mass:g} kg",)
-                if name not in self.run.model.flexible
+                if name not in self.run.model.flexible_bodies
                 else ("flexible",)
             )
             pose = self.poses[f"bodies/{name}"]
@@ -266,8 +266,8 @@ class _SceneBuilder:
             yield f"bodies/{name}", ObjectLabel(name, lines, centre, labels, positions)
         for hinge in self.hinges:
             if f"hinges/{hinge.name}" in self.poses:
-                slots = self.run.layout(hinge.name)
-                q = self.run.coordinate(hinge.name)
+                slots = self.run.coordinate_info(hinge.name)
+                q = self.run.coordinates(hinge.name)
                 coordinates = tuple(zip(slots.q_names, slots.q_units, strict=True))
                 values = self.when.straight(q[self.when.kept])
                 yield (

@@ -42,7 +42,7 @@ def find_pulling_contacts(result: Record) -> Iterator[Risk]:
     rolling = [constraint for constraint in model.scene.constraint if constraint.type == ROLLING]
     if not rolling or model.closed is None or not len(result.t):
         return
-    shares = model.closed.loops.not_unique
+    shares = model.closed.loops.indeterminate_reactions
     is_open = {
         constraint.name: _NORMAL_ROW in shares.get(constraint.name, ()) for constraint in rolling
     }

@@ -117,7 +117,7 @@ def _add_motion(
         return acting.observed.columns("udot", (slots.u_slice,))
 
     group.add("q", slots.q_names, slots.q_units, lambda: run.q[:, slots.q_slice],
-              speeds if straight or slots.straight else None)  # fmt: skip
+              speeds if straight or slots.rates_are_speeds else None)  # fmt: skip
     group.add("u", slots.u_names, slots.u_units, speeds, udot)
     group.add("udot", accelerations, rates, udot)
     return group

@@ -63,11 +63,11 @@ class Equations:
 
     def events(self, t: float, y: Array) -> Array:
         """Values of the events; negative where an event does not hold."""
-        return self.watched(t, y)[: self.calls.n_events]
+        return self.event_values(t, y)[: self.calls.n_events]
 
-    def watched(self, t: float, y: Array) -> Array:
+    def event_values(self, t: float, y: Array) -> Array:
         """Values of the events, followed by the margins of switches."""
-        values = self.scene.watched(t, y)
+        values = self.scene.event_values(t, y)
         if values is None:
             text = self.engine.failure_text(self.scene.run.failure, t)
             raise RunEnded(Status.EVENT_FAILED, text)

@@ -105,7 +105,7 @@ class _Loop:
         self.steps = self.event_count = 0
         #: Time of the last event, and time between the last two events, s.
         self.event_time, self.event_interval = settings.t_start, 0.0
-        bounces = self.system.engine.packed.watched.bounces
+        bounces = self.system.engine.packed.event_functions.bounces
         self.min_restitution = min((bounce.restitution for bounce in bounces), default=1.0)
         self.bounces = {bounce.event for bounce in bounces}  # numbers of bounce events
         self.last_bounce: int | None = None  # bounce event from which the present step starts
@@ -348,11 +348,11 @@ class _Loop:
 
     def events(self, t: float, y: Array) -> Array:
         """Values of the events at a state; a value that is nan ends the run."""
-        return self.watched(t, y)[: self.n_events]
+        return self.event_values(t, y)[: self.n_events]
 
-    def watched(self, t: float, y: Array) -> Array:
+    def event_values(self, t: float, y: Array) -> Array:
         """Values of the events, then margins of switches; an event value of nan ends the run."""
-        values = self.system.watched(t, y)
+        values = self.system.event_values(t, y)
         is_nan = np.isnan(values[: self.n_events])
         if is_nan.any():
             name = self.system.scene.event_names[int(np.argmax(is_nan))]
@@ -434,7 +434,7 @@ class _Loop:
         """Conditions within the last step."""
         start, end = float(solver.t_old), float(solver.t)
         dense = solver.dense_output()
-        return Between(self.system, self.watched, dense, start, end, self.unseen)
+        return Between(self.system, self.event_values, dense, start, end, self.unseen)
 
     def first_crossing(
         self, conditions: Between, indices: list[int], signs: Array, left: Look, right: Look

@@ -29,7 +29,7 @@ class ClosedStates:
 
     def __init__(self, model: CompiledScene, freedom: IndependentSpeeds, t: float) -> None:
         self.engine, self.freedom, self.t = model.looped, freedom, t
-        self.layout, self.sizes = model.layout, speed_scales(model)
+        self.layout, self.sizes = model.coordinate_layout, speed_scales(model)
         self.memory = model.looped.start_memory()
         self._scene = SceneSystem(model.looped, with_power=False)
         self._still = np.zeros(model.nu)
@@ -76,7 +76,7 @@ class ClosedStates:
 
     def _step(self, q: Array, places: Sequence[int], motion: Array) -> Array:
         follows = self.freedom.following(q, places)
-        return self.state(self.freedom.moved(q, follows @ motion))[0]
+        return self.state(self.freedom.move(q, follows @ motion))[0]
 
     def _motion_to(self, target: Array, q: Array, places: Sequence[int]) -> Array:
         """Motion along the speeds `places` that moves their coordinates from q to `target`."""
@@ -84,7 +84,7 @@ class ClosedStates:
         slots_by_speed = {slots.u: slots for slots in map(self.layout.hinge_of_speed, places)}
         for slots in slots_by_speed.values():
             gap = (target - q)[slots.q_slice]
-            if not slots.straight:
+            if not slots.rates_are_speeds:
                 speeds = np.eye(len(motion))[slots.u_slice]
                 rates = [self.engine.rates(self.t, q, speed, self.memory) for speed in speeds]
                 rate_matrix = np.array(rates)[:, slots.q_slice].T

@@ -71,7 +71,7 @@ def static_deformation_with_loops(
     has with rigid bodies, keep their coordinates and speeds, as do the modes of other bodies; the
     other hinges follow.
     """
-    slots, closed = model.layout.modal, ClosedStates(model, freedom, 0.0)
+    slots, closed = model.coordinate_layout.modal, ClosedStates(model, freedom, 0.0)
     modal_speeds = _indices(slots[name].u_slice for name in bodies).tolist()
     fixed, own = freedom.settling(q, modal_speeds, *_fixed_speeds(model, u, bodies))
     independent, count = (*fixed, *own), len(fixed)
@@ -105,9 +105,9 @@ def _fixed_speeds(
     The former belong to hinges with `hold` and to the modes of other bodies, the latter to hinges
     with a given speed.
     """
-    layout, free = model.layout, set(model.free_speeds)
+    layout, free = model.coordinate_layout, set(model.free_speed_indices)
     slices = [slots.u_slice for name, slots in layout.modal.items() if name not in bodies]
-    slices += [layout.hinges[h.name].u_slice for h in model.packed.described.hinge if h.hold]
+    slices += [layout.hinges[h.name].u_slice for h in model.packed_scene.described.hinge if h.hold]
     fast = [] if model.closed is None else model.closed.fast
     preferred = _indices(layout.hinges[name].u_slice for name in fast).tolist()
     fixed = [k for k in _indices(slices).tolist() if k in free]

@@ -79,7 +79,7 @@ def test_a_sprung_pin_takes_a_frame_that_keeps_its_inertia() -> None:
         ],
     )  # fmt: skip
     model = mstmm.compile(scene, engine="looped")
-    assert [body.frame for body in model.flexible.values()] == ["chord", "mean"]
+    assert [body.frame for body in model.flexible_bodies.values()] == ["chord", "mean"]
     assert model.simulate(0.5, rtol=1e-6, atol=1e-8).success
 
 

@@ -110,7 +110,7 @@ def test_a_static_start_is_found_where_the_equilibrium_is() -> None:
 def test_residuals_have_the_names_of_the_coordinates() -> None:
     model = welded(4, 2.0)
     found = model.equilibrium()
-    assert list(found.residuals) == model.layout.u_names
+    assert list(found.residuals) == model.coordinate_layout.u_names
     still = np.zeros(model.nu)
     left = model.inverse_dynamics(found, still, still)
     assert list(found.residuals.values()) == left.tolist()

@@ -105,7 +105,7 @@ def test_a_load_past_the_critical_one_is_said_to_buckle() -> None:
             1, {"force": [0, -share * PRANDTL, 0]}, modes={"y": 0, "z": 6, "twist": 6}
         )
         run = mstmm.compile(scene).simulate(t_end=0.01)
-        (found,) = run.certificate.flexible
+        (found,) = run.certificate.flexible_bodies
         assert found.gamma is not None
         assert -found.gamma[0] == pytest.approx(share, rel=1e-3)
         assert any("buckling" in text for text in run.certificate.warnings) == (share > 1)
@@ -119,7 +119,7 @@ def bent_tip(parts: int, load: float, **beam: Any) -> tuple[Any, list[str]]:
     """Displacement (3,) of the tip at rest under dead forces along y and z, and what is said."""
     force = [0, load / np.sqrt(2), load / np.sqrt(2)]
     model = mstmm.compile(cantilever(parts, {"force": force}, **SKEW, **beam), engine="looped")
-    at_rest = (model.equilibrium(), np.zeros(model.layout.nu))
+    at_rest = (model.equilibrium(), np.zeros(model.coordinate_layout.nu))
     run = model.simulate(t_end=1e-6, step=1e-6, method="rk4", initial=at_rest)
     return run.position(f"b{parts - 1}.tip")[0] - [1, 0, 0], list(run.certificate.warnings)
 

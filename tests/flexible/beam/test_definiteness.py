@@ -66,12 +66,14 @@ def test_the_mean_frame_keeps_it(basis: str, modes: dict[str, int]) -> None:
 
 
 def test_parts_take_the_mean_frame_where_they_move() -> None:
-    frames = [body.frame for body in cantilever(3, 3).flexible.values()]
+    frames = [body.frame for body in cantilever(3, 3).flexible_bodies.values()]
     assert frames == ["tangent", "mean", "mean"]
-    asked = cantilever(3, 3, frame="tangent").flexible
+    asked = cantilever(3, 3, frame="tangent").flexible_bodies
     assert [len(body.points) > 0 for body in asked.values()] == [False, True, True]
-    assert not any(body.points for body in cantilever(3, 3, stiffening=False).flexible.values())
-    straight = cantilever(3, 3, stiffening=False).flexible
+    assert not any(
+        body.points for body in cantilever(3, 3, stiffening=False).flexible_bodies.values()
+    )
+    straight = cantilever(3, 3, stiffening=False).flexible_bodies
     assert {body.frame for body in straight.values()} == {"tangent"}
 
 
@@ -111,7 +113,7 @@ def test_rigid_bodies_that_ride_along_count() -> None:
         ]
         hub = {"name": "hub", "mass": 1.0, "inertia": [inertia] * 3, "ends": {"rim": [0.1, 0, 0]}}
         scene = mstmm.Scene(gravity=[0, 0, 0], body=[hub], beam=[blade], hinge=hinges)
-        return mstmm.compile(scene, engine="looped").flexible["blade"].frame
+        return mstmm.compile(scene, engine="looped").flexible_bodies["blade"].frame
 
     assert frame(5.0) == "tangent"
     assert frame(1e-3) == "mean"
@@ -134,7 +136,7 @@ def test_the_inertia_seen_is_that_of_the_engine() -> None:
     ]
     scene = mstmm.Scene(gravity=[0, 0, 0], body=[hub], beam=[blade], hinge=hinges)
     model = mstmm.compile(scene, engine="looped")
-    body, support = model.flexible["blade"], Supports(scene).of("blade")
+    body, support = model.flexible_bodies["blade"], Supports(scene).of("blade")
     for size in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2):
         eta = size * np.array([0.5, -1.0])
         matrix = model.mass_matrix([0.0, *eta])
@@ -161,4 +163,7 @@ def test_a_frame_that_follows_from_the_number_of_shapes_is_told(
         model = mstmm.compile(scene, engine="looped")
         said = "tangent with fewer shapes"
         assert (said in str(model.simulate(1e-3).certificate)) == bool(expected)
-        assert any("with fewer shapes" in note for note in model.flexible["arm"].notes) == expected
+        assert (
+            any("with fewer shapes" in note for note in model.flexible_bodies["arm"].notes)
+            == expected
+        )

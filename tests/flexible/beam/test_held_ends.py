@@ -55,7 +55,7 @@ def test_tension_and_sag_of_a_beam_between_two_pins(axial: float) -> None:
     """With a shape of a free end the tension was 16 % too high; a stiff beam had none and was
     rigid between its pins."""
     model = mstmm.compile(held_beam(axial), engine="looped")
-    q, body = model.equilibrium(), model.flexible["b"]
+    q, body = model.equilibrium(), model.flexible_bodies["b"]
     eta = np.asarray(q)[-body.n :]
     tension = tension_of(axial)
     found = axial * (body.ports["tip"].phi - body.ports["root"].phi)[0] @ eta

@@ -41,7 +41,7 @@ def model(**keys: Any) -> mstmm.Model:
 
 
 def body(**keys: Any) -> ModalBody:
-    return model(**keys).flexible["b"]
+    return model(**keys).flexible_bodies["b"]
 
 
 def peak(work: Callable[[], object]) -> int:
@@ -142,4 +142,4 @@ def test_more_points_of_mass_than_memory_are_refused_by_name() -> None:
 
 def test_the_certificate_takes_pairs_of_shapes_in_portions() -> None:
     gone = model(modes={"y": 16, "z": 16}, stiffening=False).simulate(1e-5, method="rk4", step=1e-6)
-    assert peak(lambda: gone.certificate.flexible) < 150e6
+    assert peak(lambda: gone.certificate.flexible_bodies) < 150e6

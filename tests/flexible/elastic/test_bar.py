@@ -52,7 +52,7 @@ def test_frequencies_of_the_cantilever() -> None:
 def test_reduction_error_against_the_whole_mesh() -> None:
     """Four fixed-interface modes: 2e-5 in the first frequency, 4e-3 in the fourth, from above."""
     model, reduction = bar.model(), bar.reduced(0.3, 4)
-    held = reduction.sections.clamped([reduction.held])
+    held = reduction.sections.clamp([reduction.held])
     free = held.free
     stiffness = reduction.sections.stiffness.toarray()[np.ix_(free, free)]
     mass = reduction.sections.mass.toarray()[np.ix_(free, free)]
@@ -85,7 +85,7 @@ def test_static_shapes_are_exact(frame: str) -> None:
     relative = relative - root - np.vstack([turned, np.zeros_like(turned)])
     stiffness = bar.MASS * reduction.frequencies**2
     compliance = (relative / stiffness) @ relative.T
-    held = reduction.sections.clamped([reduction.held])
+    held = reduction.sections.clamp([reduction.held])
     loads = reduction.sections.rows["tip"].toarray().T
     whole = reduction.sections.rows["tip"] @ held.statics(loads)
     assert np.allclose(compliance, whole, rtol=0, atol=1e-7 * np.abs(whole).max())

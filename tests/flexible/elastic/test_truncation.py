@@ -67,7 +67,7 @@ def test_the_whole_deflection_is_that_of_a_bar(load: list[float]) -> None:
 
 def told(scene: mstmm.Scene, t_end: float) -> list[str]:
     run = mstmm.compile(scene, engine="looped").simulate(t_end, rtol=1e-5)
-    assert run.certificate.flexible[0].tail is not None
+    assert run.certificate.flexible_bodies[0].tail is not None
     return [text for text in run.warnings if "miss" in text]
 
 

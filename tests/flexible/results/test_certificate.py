@@ -47,7 +47,7 @@ def test_a_linear_beam_spun_past_its_first_frequency_is_warned_about() -> None:
 def test_with_stiffening_the_same_spin_is_within_the_model() -> None:
     result = run_of(scene(beam(), drive=SPIN_UP), 20.0)
     assert result.warnings == ()
-    (blade,) = result.certificate.flexible
+    (blade,) = result.certificate.flexible_bodies
     assert blade.spin_ratio == pytest.approx(1.580, abs=1e-3)
     assert blade.gamma is not None and blade.gamma[1] > 2.0
     assert 0.07 < blade.slope < 0.08
@@ -57,7 +57,7 @@ def test_with_stiffening_the_same_spin_is_within_the_model() -> None:
 def test_a_linear_beam_that_turns_slowly_is_not_warned_about() -> None:
     result = run_of(scene(beam(stiffening=False), drive="0.1*t^2"), 2.0)
     assert result.warnings == ()
-    assert result.certificate.flexible[0].load_ratio < 0.1
+    assert result.certificate.flexible_bodies[0].load_ratio < 0.1
 
 
 def test_a_slope_beyond_the_range_of_one_frame_is_warned_about() -> None:
@@ -82,7 +82,7 @@ def test_shapes_that_cannot_carry_the_load_at_the_tip_are_warned_about() -> None
     assert matching(poor, r'shapes of "blade" miss 20% of its bending energy')
     good = under_couple()
     assert good.warnings == ()
-    assert good.certificate.flexible[0].tail == pytest.approx(0.0, abs=1e-6)
+    assert good.certificate.flexible_bodies[0].tail == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_tangent_frame_at_a_pinned_end_is_warned_about() -> None:
@@ -127,7 +127,7 @@ def test_long_chains_of_pinned_beams_keep_their_pivots(frame: str) -> None:
     ]  # fmt: skip
     beams = [beam(name=f"b{k}", length=0.1, frame=frame) for k in range(count)]
     one = mstmm.Scene(gravity=(0, -9.81, 0), beam=beams, hinge=hinges)
-    pivot = mstmm.compile(one, engine="looped").simulate(0.0).certificate.pivot
+    pivot = mstmm.compile(one, engine="looped").simulate(0.0).certificate.pivot_loss
     assert pivot is not None and 1.0 <= pivot.ratio < 1e3
 
 

@@ -192,7 +192,7 @@ def test_shear_counts_as_much_as_its_shape_moves() -> None:
 def test_each_limit_has_its_warning(changes: dict[str, Any], words: str) -> None:
     (risk,) = flexibility_risks([replace(PLAIN, **changes)])
     assert re.search(words, str(risk))
-    assert risk.doubt and risk.element == '"blade"'
+    assert risk.invalidates and risk.element == '"blade"'
 
 
 def test_a_body_within_its_range_is_not_warned_about() -> None:

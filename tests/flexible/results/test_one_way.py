@@ -90,7 +90,7 @@ def by_hand() -> mstmm.Result:
 def test_rigid_run(level: str) -> None:
     """Mass, inertia, ends and loads are those of the undeformed arm, at both levels."""
     found, expected = simulated(level), by_hand()
-    assert found.model.layout.q_names == ["axle.angle", "joint.angle"]
+    assert found.model.coordinate_layout.q_names == ["axle.angle", "joint.angle"]
     assert np.abs(found.q - expected.q).max() < 1e-9
     for hinge in ("axle", "root", "joint"):
         assert np.allclose(found.force(hinge), expected.force(hinge), atol=1e-7)
@@ -209,7 +209,7 @@ def test_one_body_of_two() -> None:
     both = mstmm.Scene(gravity=[0, -9.81, 0], body=[HUB], beam=[first, second], hinge=hinges)
     found = mstmm.compile(both).simulate(0.2)
     assert isinstance(found, OneWayResult)
-    assert found.model.layout.q_names == ["axle.angle", "second.y1"]
+    assert found.model.coordinate_layout.q_names == ["axle.angle", "second.y1"]
     moved = found.position("second.root") - found.rigid.position("second.root")
     assert np.allclose(found.position("first.tip"), found.position("second.root"), atol=1e-12)
     assert np.abs(moved).max() > 1e-3
@@ -249,7 +249,7 @@ def test_mass_points_have_no_part_in_it() -> None:
     """Momenta of a body that would carry its mass in points, were it coupled."""
     rotary = {"rotary_inertia": 5e-4}
     plain, points = one_way(**rotary), one_way(**rotary, quadrature=True)
-    assert points.momentum_of("arm") == pytest.approx(plain.momentum_of("arm"), rel=1e-12)
+    assert points.body_momentum("arm") == pytest.approx(plain.body_momentum("arm"), rel=1e-12)
     assert points.response("arm").eta == pytest.approx(plain.response("arm").eta, rel=1e-12)
 
 

@@ -44,7 +44,7 @@ def test_shapes_are_drawn_where_the_beam_was(run: Result) -> None:
     rest, bent = lines_of(figure.axes[0], 61)
     at = shape_samples(run.t)
     assert len(at) == 12 and at[0] == 0 and at[-1] == 60
-    np.testing.assert_allclose(bent, run.shape("blade", 61)[at][:, :, :2], atol=1e-14)
+    np.testing.assert_allclose(bent, run.deflected_shape("blade", 61)[at][:, :, :2], atol=1e-14)
     np.testing.assert_allclose(rest[:, 0], run.position("blade")[at][:, :2], atol=1e-14)
     assert np.abs(rest[-1, 30] - bent[-1, 30]).max() > 1e-3
     assert [figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()] == ["x in m", "y in m"]
@@ -82,7 +82,7 @@ def test_deflection_along_the_beam_and_energies(run: Result, tmp_path: Path) -> 
 
 
 def test_pictures_have_names(run: Result) -> None:
-    assert run.pictures() == ("shape", "blade.shape", "blade.deflection", "blade.modal_energy")
+    assert run.picture_names() == ("shape", "blade.shape", "blade.deflection", "blade.modal_energy")
     with pytest.raises(mstmm.SceneError, match="no such quantity"):
         run.plot("arm.shape")
 

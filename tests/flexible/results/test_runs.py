@@ -110,10 +110,11 @@ def test_the_same_with_stiffening_up_to_third_order(
 @pytest.mark.parametrize("table", [{}, {"quadrature": True}, {"frame": "mean"}])
 def test_momenta_of_the_bodies_are_those_of_the_scene(table: dict[str, Any]) -> None:
     run = run_of(machine(**table))
-    linear = sum(run.momentum_of(body) for body in BODIES)
+    linear = sum(run.body_momentum(body) for body in BODIES)
     np.testing.assert_allclose(linear, run.momentum(), atol=1e-13)
     angular = sum(
-        run.angular_momentum_of(body) + np.cross(run.center_of_mass(body), run.momentum_of(body))
+        run.body_angular_momentum(body)
+        + np.cross(run.center_of_mass(body), run.body_momentum(body))
         for body in BODIES
     )
     np.testing.assert_allclose(angular, run.angular_momentum(), atol=1e-13)
@@ -121,17 +122,17 @@ def test_momenta_of_the_bodies_are_those_of_the_scene(table: dict[str, Any]) -> 
 
 def test_a_rigid_body_moves_as_its_equivalent(run: Result) -> None:
     spin, origin = run.angular_velocity("bob"), run.position("bob")
-    np.testing.assert_array_equal(run.equivalent_spin("bob"), spin)
+    np.testing.assert_array_equal(run.equivalent_angular_velocity("bob"), spin)
     arm = run.center_of_mass("bob") - origin
     np.testing.assert_allclose(np.linalg.norm(arm, axis=1), np.sqrt(0.003), rtol=1e-12)
     moved = run.velocity("bob") + np.cross(spin, arm)
     np.testing.assert_allclose(run.equivalent_velocity("bob"), moved, atol=1e-14)
-    np.testing.assert_allclose(run.momentum_of("bob"), 0.2 * moved, atol=1e-14)
+    np.testing.assert_allclose(run.body_momentum("bob"), 0.2 * moved, atol=1e-14)
 
 
 def test_deflections_agree_with_the_motion_of_the_ends(run: Result) -> None:
     """The end in the floating frame: at rest place and deflection, turned outwards."""
-    tip = run.shape("blade", points=3)[:, -1]
+    tip = run.deflected_shape("blade", points=3)[:, -1]
     np.testing.assert_allclose(tip, run.position("blade.tip"), atol=1e-13)
     several = run.deflection("blade", [0.0, 0.45, 1.0])
     assert several.shape == (21, 3, 3)
@@ -145,7 +146,7 @@ def test_deflections_agree_with_the_motion_of_the_ends(run: Result) -> None:
 
 def test_energies_of_the_modes(run: Result) -> None:
     strain = run.strain_energy("blade")
-    springs = run.energies()["springs"]
+    springs = run.energy_components()["springs"]
     reach = np.linalg.norm(run.position("blade.tip"), axis=1)
     np.testing.assert_allclose(springs, strain + 1.5 * (reach - 0.2) ** 2, rtol=1e-12)
     assert run.modal_energy("blade").shape == (21, 5)
@@ -166,7 +167,7 @@ def test_free_flight_keeps_the_equivalent_motion() -> None:
         table = {**beam, "frame": frame, "initial": start}
         scene = mstmm.Scene(gravity=(0, -9.81, 0), beam=[table], hinge=[hinge])
         run = mstmm.compile(scene).simulate(0.5, rtol=1e-11, atol=1e-13)
-        velocity, spin = run.equivalent_velocity("spear"), run.equivalent_spin("spear")
+        velocity, spin = run.equivalent_velocity("spear"), run.equivalent_angular_velocity("spear")
         falling = velocity[0] + np.outer(run.t, [0.0, -9.81, 0.0])
         np.testing.assert_allclose(velocity, falling, atol=1e-9)
         np.testing.assert_allclose(spin, np.tile(spin[0], (len(run.t), 1)), atol=1e-9)
@@ -177,17 +178,17 @@ def test_free_flight_keeps_the_equivalent_motion() -> None:
 
 
 def test_inner_nodes_are_no_bodies_and_no_hinges(run: Result) -> None:
-    assert list(run.model.layout.hinges) == ["base", "holder", "wrist"]
+    assert list(run.model.coordinate_layout.hinges) == ["base", "holder", "wrist"]
     references = list(run._observed.references)
     assert references == [
         "hub", "hub.out", "bob", "blade", "blade.root", "blade.tip", "blade.mid"
     ]  # fmt: skip
-    assert not any("/" in name for name in run.names())
+    assert not any("/" in name for name in run.quantity_names())
 
 
 def test_quantities_by_name(run: Result) -> None:
     first = run.quantity("blade.y1")
-    np.testing.assert_array_equal(first.values, run.coordinate("blade")[:, 0])
+    np.testing.assert_array_equal(first.values, run.coordinates("blade")[:, 0])
     assert first.unit == "m" and run.quantity("blade.twist1").unit == "rad"
     assert run.quantity("blade.y1_rate").unit == "m/s"
     assert run.quantity("blade.y1_acceleration").unit == "m/s2"
@@ -195,7 +196,7 @@ def test_quantities_by_name(run: Result) -> None:
     np.testing.assert_array_equal(deflection.values, run.deflection("blade", "tip")[:, 1])
     energies = run.quantity("blade.modal_energy")
     assert energies.labels == ("y1", "y2", "z1", "z2", "twist1") and energies.unit == "J"
-    for name in run.names():
+    for name in run.quantity_names():
         if "blade" in name or name.startswith("bob"):
             assert len(run.quantity(name).values) == len(run.t), name
     assert np.isfinite(run._observed.part("efforts")).all()
@@ -276,15 +277,15 @@ def test_an_elastic_body_has_what_needs_no_axis(tmp_path: Path) -> None:
     box = elastic_bar.table(box=elastic_bar.short(3))
     scene = mstmm.Scene(gravity=(0, 0, -9.81), elastic=[box], body=[bob], hinge=hinges)
     run = mstmm.compile(scene, engine="looped").simulate(0.02, output_times=np.linspace(0, 0.02, 6))
-    total = run.momentum_of("bar") + run.momentum_of("bob")
+    total = run.body_momentum("bar") + run.body_momentum("bob")
     np.testing.assert_allclose(total, run.momentum(), atol=1e-14)
     np.testing.assert_allclose(
         run.modal_energy("bar").sum(axis=1) >= run.strain_energy("bar"), True
     )
-    (bar,) = run.certificate.flexible
+    (bar,) = run.certificate.flexible_bodies
     assert bar.gamma is not None and run.warnings == ()
     assert bar.tail is not None and bar.tail < 1e-3  # its deflection is judged, without an axis too
-    assert run.pictures() == ("shape", "bar.shape", "bar.modal_energy")
+    assert run.picture_names() == ("shape", "bar.shape", "bar.modal_energy")
     assert len(run.plot("shape").axes) == 2
     again = mstmm.load_result(run.save(tmp_path / "bar.nc"))
     np.testing.assert_array_equal(again.modal_energy("bar"), run.modal_energy("bar"))

@@ -42,11 +42,11 @@ def test_what_turns_along_answers() -> None:
     omega, model = np.array([1.0, 9.0, 20.0]), turntable()
     found = model.frequency_response(omega, ["rail.effort"], ["rail.displacement"])
     expected = 1 / (STIFF - MASS * SPIN**2 - MASS * omega**2 + 1j * omega * DAMPING)
-    np.testing.assert_allclose(found.values[:, 0, 0], expected, rtol=1e-12)
+    np.testing.assert_allclose(found.response[:, 0, 0], expected, rtol=1e-12)
     assert found.trusted and model.modes().trusted and model.equilibrium().trusted
     assert not model.linearize().warnings
     along = model.frequency_response(omega, ["ground.acceleration.z"], ["rail.displacement"])
-    assert not along.values.any()
+    assert not along.response.any()
 
 
 @pytest.mark.parametrize("drive", ["3*t", ""])
@@ -81,7 +81,7 @@ def test_only_what_is_asked_counts() -> None:
     found = linear.frequency_response([2.0], ["rail.effort"], ["rail.displacement"])
     assert found.trusted and not found.risks
     expected = 1 / (STIFF - MASS * SPIN**2 - MASS * 4 + 2j * DAMPING)
-    assert found.values[0, 0, 0] == pytest.approx(expected, rel=1e-12)
+    assert found.response[0, 0, 0] == pytest.approx(expected, rel=1e-12)
     idle = linear.frequency_response([2.0], ["table.moment.z"], ["rail.displacement"])
     assert [risk.name for risk in idle.risks] == ["input-without-effect"]
 
@@ -95,7 +95,7 @@ def test_matrices_that_depend_on_the_angle() -> None:
     assert not linear.trusted and not model.modes().trusted
     with pytest.raises(SceneError, match="changes the matrices, so that other frequencies"):
         linear.frequency_response([2.0], outputs=["spring.displacement"])
-    assert not model.locus("spring.law.stiffness[0]", [200.0, 300.0]).trusted
+    assert not model.root_locus("spring.law.stiffness[0]", [200.0, 300.0]).trusted
 
 
 def test_stiffness_that_goes_with_time() -> None:
@@ -129,7 +129,7 @@ def test_an_unbalanced_rotor_does_not_rest() -> None:
     linear = model.linearize()
     (risk,) = linear.risks
     assert risk.name == "unsteady-state" and risk.unit == "N" and not linear.trusted
-    assert risk.figure == pytest.approx(40 * (1 - math.cos(3.3)), rel=1e-9)
+    assert risk.value == pytest.approx(40 * (1 - math.cos(3.3)), rel=1e-9)
     assert not model.modes().trusted
     true = -2 * 0.05 * 400 / (1000 - 3 * 400)  # forced whirl, m e W^2/(k - m W^2), far from rest
     assert abs(linear.state.q[0]) < 0.3 * true
@@ -188,7 +188,7 @@ def test_creep_is_followed_for_a_thousand_seconds(speed: float) -> None:
     for risk in found:
         (t,) = re.findall(r"at t = (\S+) s", str(risk))
         assert 900 < float(t) < 1100
-        assert risk.figure == pytest.approx(2 * 9.81 * 0.5 * math.sin(speed * float(t)), rel=1e-5)
+        assert risk.value == pytest.approx(2 * 9.81 * 0.5 * math.sin(speed * float(t)), rel=1e-5)
 
 
 def test_a_carriage_that_moves_on_is_steady() -> None:
@@ -202,7 +202,7 @@ def test_a_carriage_that_moves_on_is_steady() -> None:
     )  # fmt: skip
     assert model.equilibrium().trusted and not model.linearize().warnings
     found = model.frequency_response([1.0], ["ground.acceleration.x"], ["pivot.angle", "bob.x"])
-    assert found.values[0, 0, 0] == pytest.approx(-1 / (9.81 - 1.1))
+    assert found.response[0, 0, 0] == pytest.approx(-1 / (9.81 - 1.1))
 
 
 def test_closed_loops_that_turn() -> None:
@@ -264,4 +264,4 @@ def test_a_response_beside_a_motion_that_is_given() -> None:
         omega, ["rail.effort"], ["rail.displacement"], [0.0, 0.0], u=[SPIN, 0.0]
     )
     expected = 1 / (STIFF - MASS * SPIN**2 - MASS * omega**2 + 1j * omega * DAMPING)
-    np.testing.assert_allclose(found.values[:, 0, 0], expected, rtol=1e-12)
+    np.testing.assert_allclose(found.response[:, 0, 0], expected, rtol=1e-12)

@@ -75,7 +75,7 @@ def test_chains_of_flexible_bodies(seed: int) -> None:
     tree = random_beams.random_system(seed, most=3, chain=True)
     scene, q, u, meeting = closed(tree, seed)
     model = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    slots = model.layout.hinges["wrist"]
+    slots = model.coordinate_layout.hinges["wrist"]
     whole_q, whole_u = np.insert(q, [slots.q] * 4, 0.0), np.insert(u, [slots.u] * 3, 0.0)
     whole_q[slots.q] = 1.0
     found = np.delete(model.accelerations(whole_q, whole_u), slots.u_slice)

@@ -133,7 +133,7 @@ def test_accelerations_are_those_of_the_tree_under_the_forces_that_close_it(name
     bent = wrist["outboard"] if "tip" in wrist["outboard"] else wrist["inboard"]
     apart = closed.position(bent) - closed.position(other)
     np.testing.assert_allclose(apart[:, :rows], 0, atol=1e-9)
-    slots = closed.model.layout.hinges["wrist"]
+    slots = closed.model.coordinate_layout.hinges["wrist"]
     q, u = (np.delete(x[-1], part) for x, part in
             ((closed.q, slots.q_slice), (closed.u, slots.u_slice)))  # fmt: skip
     assert np.abs(q[-2:]).max() > 1e-6  # bent
@@ -160,12 +160,12 @@ def test_cutting_another_hinge_changes_nothing() -> None:
     for other in found[1:]:
         for hinge in ("foot", "guide"):
             np.testing.assert_allclose(
-                other.coordinate(hinge), found[0].coordinate(hinge), atol=1e-7
+                other.coordinates(hinge), found[0].coordinates(hinge), atol=1e-7
             )
         np.testing.assert_allclose(other.position("bar.tip"), found[0].position("bar.tip"),
                                    atol=1e-7)  # fmt: skip
     loops = mstmm.compile(mstmm.Scene(**slider_crank())).loops
-    assert (loops.rank, loops.mobility, loops.shapes) == (2, 3, 2)
+    assert (loops.rank, loops.mobility, loops.flexible_mobility) == (2, 3, 2)
 
 
 def test_a_start_that_is_bent_stays_bent() -> None:
@@ -175,7 +175,7 @@ def test_a_start_that_is_bent_stays_bent() -> None:
     scene["beam"][0]["initial"] = {"eta": bent, "etad": rates}
     model = mstmm.compile(mstmm.Scene(**scene))
     q, u = model.initial_state()
-    slots = model.layout.modal["bar"]
+    slots = model.coordinate_layout.modal["bar"]
     np.testing.assert_allclose(q[slots.q_slice], bent, rtol=0.05)
     np.testing.assert_allclose(u[slots.u_slice], rates, rtol=0.05)
 
@@ -184,8 +184,8 @@ def test_a_stiff_rod_moves_as_a_rigid_one() -> None:
     """What it bends by goes with 1 / EI."""
     scene = slider_crank()
     scene["beam"][0]["model"] = "rigid"
-    rigid = run(scene).coordinate("foot")[-1, 0]
-    gaps = [abs(run(slider_crank(stiffness=ei)).coordinate("foot")[-1, 0] - rigid)
+    rigid = run(scene).coordinates("foot")[-1, 0]
+    gaps = [abs(run(slider_crank(stiffness=ei)).coordinates("foot")[-1, 0] - rigid)
             for ei in (1e4, 1e5)]  # fmt: skip
     assert gaps[0] > 1e-6
     assert gaps[1] < 0.5 * gaps[0]
@@ -211,7 +211,7 @@ def test_a_wrist_that_lets_go_leaves_the_tree() -> None:
              "position": place.tolist(), "orientation": [0.0, 0.0, angle],
              "release": "t >= 0.1", "cut": True}  # fmt: skip
     held = run(tree | {"hinge": [*tree["hinge"], wrist]})
-    own = held.model.layout.hinges["wrist"]
+    own = held.model.coordinate_layout.hinges["wrist"]
     q, u = np.delete(held.q, own.q_slice, 1), np.delete(held.u, own.u_slice, 1)
     assert np.abs(held.position("bar.tip")[1] - place).max() < 1e-9
     free = open_tree.simulate(0.3, t_start=0.1, initial=(q[1], u[1]), rtol=1e-9, atol=1e-11)
@@ -229,9 +229,11 @@ def test_a_stiff_bushing_does_as_the_hinge() -> None:
          "damping": [c, c, 0, 0, 0, 0]}
     ]  # fmt: skip
     closed = run(scene)
-    kept = np.delete(np.arange(closed.q.shape[1]), closed.model.layout.hinges["wrist"].q_slice)
+    kept = np.delete(
+        np.arange(closed.q.shape[1]), closed.model.coordinate_layout.hinges["wrist"].q_slice
+    )
     soft = run(tree, initial=(closed.q[0, kept], closed.u[0, kept]))
-    assert soft.coordinate("foot")[-1] == pytest.approx(closed.coordinate("foot")[-1], abs=1e-4)
+    assert soft.coordinates("foot")[-1] == pytest.approx(closed.coordinates("foot")[-1], abs=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -86,8 +86,8 @@ def test_what_closes_acts_along_its_row(name: str) -> None:
     closing, ring, row = ROWS[name]
     one = bladed(ring, **closing)
     q, u = one.initial_state()
-    places = [one.layout.q_names.index(x) for x in free().layout.q_names]
-    speeds = [one.layout.u_names.index(x) for x in free().layout.u_names]
+    places = [one.coordinate_layout.q_names.index(x) for x in free().coordinate_layout.q_names]
+    speeds = [one.coordinate_layout.u_names.index(x) for x in free().coordinate_layout.u_names]
     q_free, u_free = q[places], u[speeds]
     added = one.accelerations(q, u)[speeds] - free().accelerations(q_free, u_free)
     efforts = free().mass_matrix(q_free) @ added
@@ -116,4 +116,4 @@ def test_a_tip_where_nothing_else_is() -> None:
     assert (one.loops.rank, one.loops.mobility) == (1, 3)
     run = one.simulate(0.2, rtol=1e-8, output_times=np.linspace(0, 0.2, 5))
     assert np.abs(run.position("b.tip")[:, 1]).max() < 1e-12
-    assert np.abs(run.q[:, run.model.layout.modal["b"].q_slice]).max() > 1e-3
+    assert np.abs(run.q[:, run.model.coordinate_layout.modal["b"].q_slice]).max() > 1e-3

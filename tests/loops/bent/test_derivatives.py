@@ -33,7 +33,7 @@ def by_differences(side: Callable[[float], list[Array]], step: float) -> list[Ar
 def test_along_closed_motions(scene: Callable[[], Scene], rng: np.random.Generator) -> None:
     """In motion, along every independent motion and speed."""
     model = compiled(scene())
-    freedom, q, u = model.freedom, *model.initial_state()
+    freedom, q, u = model.independent_speeds, *model.initial_state()
     assert freedom is not None
     places = freedom.places
     ways = freedom.following(q, places)
@@ -77,8 +77,8 @@ def test_those_of_linear_models(scene: Callable[[], Scene]) -> None:
     made["beam"][0]["damping"] = 0.03
     model: mstmm.Model = compiled(made)
     linear = model.linearize()
-    assert linear.mechanism is not None
-    along, places = linear.mechanism.ways, list(linear.free)
+    assert linear.constrained_motion is not None
+    along, places = linear.constrained_motion.ways, list(linear.free_speed_indices)
     found = model.derivatives(linear.state.q, linear.state.u)
     both = np.hstack([(found.q @ along)[places], (found.u @ along)[places]])
     assert worst(both, linear.A[len(places) :]) < 1e-11

@@ -20,7 +20,7 @@ def accelerations(model: mstmm.Model) -> dict[str, float]:
     """Those of the speeds at the start, where the loop is closed, by their names."""
     start = model.simulate(1e-6, output_times=[0.0, 1e-6])
     found = model.accelerations(start.q[0], start.u[0])
-    return dict(zip(model.layout.u_names, found, strict=True))
+    return dict(zip(model.coordinate_layout.u_names, found, strict=True))
 
 
 @pytest.mark.parametrize(("mass", "least"), [(1e4, 1e-11), (1e8, 1e-7), (1e10, 1e-5)])

@@ -22,7 +22,7 @@ def errors(model: mstmm.Model, method: str, end: float, steps: int) -> Array:
     at: dict[str, Any] = {"rtol": 1e-11, "atol": 1e-12, "output_times": np.linspace(0.0, end, 11)}
     exact, run = model.simulate(end, **at), model.simulate(end, method, step=end / steps, **at)
     assert run.success, run.message
-    closure = run.certificate.closure
+    closure = run.certificate.loop_closure
     assert closure is not None and closure.gap < 1e-13
     return np.array([np.abs(run.q - exact.q).max(), np.abs(run.u - exact.u).max()])
 

@@ -35,7 +35,7 @@ def at_ground(name: str, outboard: str, kind: str, x: float, **more: Any) -> Sce
 def squares(scene: Scene) -> Array:
     """(k L)^2 of the motions, which are omega.  Only beams have elastic energy."""
     modes = mstmm.compile(mstmm.Scene(gravity=[0, 0, 0], **scene)).modes()
-    shares = modes.strain()
+    shares = modes.strain_energy_shares()
     assert sum(shares[bent["name"]] for bent in scene["beam"]) == pytest.approx(1.0)
     return modes.omega
 
@@ -124,8 +124,8 @@ def test_a_column_under_what_its_loop_carries() -> None:
     for push in (-30.0, 0.0, 8.0):
         linear = mstmm.compile(mstmm.Scene(**column(push))).linearize()
         assert worst(linear.modes().omega[:3], HINGED * np.sqrt(1 - push / HINGED)) < 1e-6
-        assert worst(linear.elastic + linear.geometric + linear.load, linear.K) < 1e-12
-    found = mstmm.compile(mstmm.Scene(**column(9.0))).critical("constants.push", 9.0, 10.5)
+        assert worst(linear.K_elastic + linear.K_geometric + linear.K_load, linear.K) < 1e-12
+    found = mstmm.compile(mstmm.Scene(**column(9.0))).stability_limit("constants.push", 9.0, 10.5)
     assert found.value == pytest.approx(np.pi**2, rel=1e-6)
 
 
@@ -139,10 +139,10 @@ def test_against_the_tree_under_the_forces_that_close_it(name: str) -> None:
     wrist = scene["hinge"][3]
     bent = wrist["outboard"] if "tip" in wrist["outboard"] else wrist["inboard"]
     tree = opened(scene, rows, (bent, other))
-    q = np.delete(linear.state.q, linear.model.layout.hinges["wrist"].q_slice)
+    q = np.delete(linear.state.q, linear.model.coordinate_layout.hinges["wrist"].q_slice)
     pulls = [f"pull{k}" for k in range(rows)]
     free = tree.linearize(q, np.zeros(tree.nu), inputs=pulls)
-    efforts = free.M @ free.state.a[list(free.free)]
+    efforts = free.M @ free.state.udot[list(free.free_speed_indices)]
     forces = np.linalg.lstsq(free.V, -efforts)[0]
     assert np.abs(forces).max() > 0.1
     assert worst(free.V @ forces, -efforts) < 1e-8
@@ -162,12 +162,12 @@ def test_responses_are_those_of_the_matrices() -> None:
     linear = mstmm.compile(mstmm.Scene(**scene)).linearize(inputs=["foot.effort", "bar.tip.fy"])
     outputs = ["bar.tip.position.y", "slider.acceleration.x", "wrist.angle"]
     c, d = linear.output_matrices(outputs)
-    assert worst(linear.damping, linear.C) < 1e-12 and np.abs(linear.C).max() > 1e-3
+    assert worst(linear.C_damping, linear.C) < 1e-12 and np.abs(linear.C).max() > 1e-3
     omega = np.array([2.0, 50.0, 180.0])
     found = linear.frequency_response(omega, outputs=outputs)
     for k, s in enumerate(1j * omega):
         wanted = c @ np.linalg.solve(s * np.eye(len(linear.A)) - linear.A, linear.B) + d
-        assert np.abs(found.values[k] - wanted).max() < 1e-10 * np.abs(wanted).max()
+        assert np.abs(found.response[k] - wanted).max() < 1e-10 * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("make", [slider_crank, shackled])
@@ -175,8 +175,8 @@ def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
     """Beside rest under weight, by central differences between closed states."""
     model = mstmm.compile(mstmm.Scene(**make()))
     linear = model.linearize(inputs=["bar.tip.fy"])
-    loops, q, still = linear.mechanism, linear.state.q, np.zeros(model.nu)
-    n, places, memory = len(linear), list(linear.free), model.looped.start_memory()
+    loops, q, still = linear.constrained_motion, linear.state.q, np.zeros(model.nu)
+    n, places, memory = len(linear), list(linear.free_speed_indices), model.looped.start_memory()
     assert loops is not None
 
     def beside(x: Array) -> Array:
@@ -185,14 +185,14 @@ def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
 
     slopes = [(beside(x) - beside(-x)) / (2 * STEP) for x in STEP * np.eye(n)]
     assert worst(np.array(slopes).T, linear.A[n:, :n]) < 1e-6
-    whole = linear.elastic + linear.geometric + linear.load
+    whole = linear.K_elastic + linear.K_geometric + linear.K_load
     assert worst(whole, linear.K) < 1e-12
 
     omega, outputs = np.array([3.0, 40.0]), ["bar.tip.position.y", "wrist.angle_rate"]
     found = linear.frequency_response(omega, outputs=outputs, structural=0.05)
     c = linear.output_matrices(outputs)[0]
     for k, s in enumerate(1j * omega):
-        stiff = linear.K + 0.05j * linear.elastic
+        stiff = linear.K + 0.05j * linear.K_elastic
         x = np.linalg.solve(s**2 * linear.M + s * linear.C + stiff, linear.V)
         wanted = c[:, :n] @ x + c[:, n:] @ (s * x)
-        assert np.abs(found.values[k] - wanted).max() < 1e-9 * np.abs(wanted).max()
+        assert np.abs(found.response[k] - wanted).max() < 1e-9 * np.abs(wanted).max()

@@ -78,7 +78,7 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
         hinge.get("initial", {}).pop("u", None)
     model = compiled(scene)
     q, u = model.initial_state()
-    layout = model.layout
+    layout = model.coordinate_layout
     start = layout.hinges[scene["hinge"][0]["name"]].q_slice
     assert model.closed is not None
     np.testing.assert_allclose(q[start], model.closed.start[0][start], rtol=0, atol=1e-12)
@@ -125,7 +125,7 @@ def test_given_shapes_and_held_hinges_stay() -> None:
     model = compiled(still(scene, "right"))
     q, u = model.initial_state()
     assert model.closed is not None
-    first, layout = model.closed.start[0], model.layout
+    first, layout = model.closed.start[0], model.coordinate_layout
     for slots in (layout.modal["left"], layout.hinges["third"]):
         np.testing.assert_allclose(q[slots.q_slice], first[slots.q_slice], atol=1e-12)
     np.testing.assert_allclose(q[layout.hinges["third"].q_slice], [0.02, -0.03], atol=1e-12)
@@ -139,7 +139,7 @@ def test_a_mesh_starts_bent_too() -> None:
     model = compiled(still(meshed()))
     q, _ = model.initial_state()
     assert model.closed is not None
-    moved = model.layout.modal["bar"].q_slice
+    moved = model.coordinate_layout.modal["bar"].q_slice
     assert abs(q[0] - model.closed.start[0][0]) < 1e-12 and np.abs(q[moved]).max() > 1e-5
 
 

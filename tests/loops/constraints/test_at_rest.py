@@ -98,7 +98,7 @@ def test_a_ball_that_rolls_on_a_spring() -> None:
     omega = np.array([2.0, 9.0])
     found = model.frequency_response(omega, inputs=["ball.fx"], outputs=["ball.position.x"])
     form = 1 / (40 - inertia * omega**2 + 0.3j * omega)
-    assert np.abs(found.values[:, 0, 0] / form - 1).max() < 1e-12
+    assert np.abs(found.response[:, 0, 0] / form - 1).max() < 1e-12
 
 
 def test_a_disc_that_stands() -> None:
@@ -132,8 +132,12 @@ def test_slopes_of_accelerations() -> None:
     scene["hinge"][2]["law"] = {"stiffness": 5.0, "damping": 0.7}
     model = compiled(scene)
     linear, size = model.linearize(), 1e-4
-    assert linear.mechanism is not None
-    ways, places, q = linear.mechanism.ways, list(linear.free), linear.state.q
+    assert linear.constrained_motion is not None
+    ways, places, q = (
+        linear.constrained_motion.ways,
+        list(linear.free_speed_indices),
+        linear.state.q,
+    )
     memory = model.looped.start_memory()
 
     def closed(x: Array) -> Array:
@@ -154,6 +158,8 @@ def test_efforts_of_a_disc() -> None:
     wanted = np.array([0.4, -0.7, 1.1])
     efforts = model.inverse_dynamics(q, u, wanted)
     found = model.accelerations(q, u) + model.solve(q, efforts)
-    places = [model.layout.u_names.index(name) for name in model.loops.independent]
+    places = [
+        model.coordinate_layout.u_names.index(name) for name in model.loops.independent_speeds
+    ]
     assert worst(found[places], wanted) < 1e-11
     assert model.mass_matrix(q)[0, 0] > MASS

@@ -23,17 +23,17 @@ SCENES = {"distances": governor("constraint"), "plane": on_a_plane(), "disc": on
 def test_along_closed_motions(name: str) -> None:
     """By central differences between states of the same independent speeds and others."""
     model, draw = compiled(SCENES[name]), np.random.default_rng(4)
-    freedom, closed = model.freedom, model.closed
+    freedom, closed = model.independent_speeds, model.closed
     assert freedom is not None and closed is not None
     q, places = model.initial_state()[0], freedom.places
     x, v, dv = draw.normal(size=(3, len(places)))
     driven = np.zeros(model.nu)
-    driven[sorted({*range(model.nu)} - {*model.free_speeds})] = 10.0
+    driven[sorted({*range(model.nu)} - {*model.free_speed_indices})] = 10.0
 
     def ahead(size: float) -> tuple[Array, Array]:
-        moved = closed.assembled(q + size * rates, 0 * driven, (), ())[0]
+        moved = closed.assemble(q + size * rates, 0 * driven, (), ())[0]
         u = driven + freedom.following(moved, places) @ (v + size * dv)
-        u = closed.assembled(moved, u, (), ())[1]
+        u = closed.assemble(moved, u, (), ())[1]
         return u, model.accelerations(moved, u)
 
     ways = freedom.following(q, places)
@@ -78,7 +78,7 @@ def test_lengths_are_numbers_of_the_scene() -> None:
     """Rods of 0.31 m from arms of 0.3 m to the sleeve below."""
     longer = {f"constraint{k}.length": 0.31 for k in (1, 2)}
     arms = compiled(SCENES["distances"]).with_parameters(longer)
-    q, places = arms.initial_state()[0], arms.layout.hinges
+    q, places = arms.initial_state()[0], arms.coordinate_layout.hinges
     arm = 0.3 * np.exp(1j * q[places["hip0"].q])
     below = arm.imag + math.sqrt(0.31**2 - arm.real**2)
     assert q[places["slide"].q] == pytest.approx(-below, abs=1e-9)

@@ -76,16 +76,22 @@ def test_a_stiff_spring_at_a_rod_takes_implicit_steps() -> None:
     model = mstmm.compile(mstmm.Scene(**scene))
     result = model.simulate(0.3, "auto", rtol=1e-5, output_times=[0.0, 0.3])
     assert result.success, result.message
-    assert [one.method for one in result.methods][:2] == ["dop853", "rodas4p2"]
+    assert [one.method for one in result.method_history][:2] == ["dop853", "rodas4p2"]
     rigid = compiled(governor("constraint")).simulate(0.3, rtol=1e-9, output_times=[0.0, 0.3])
     assert np.abs(result.q[-1] - rigid.q[-1]).max() < 1e-3
 
 
 def test_own_coordinates_go_by_the_name_of_their_constraint(tmp_path: Path) -> None:
     model = compiled(cycloid(0.4))
-    names = model.layout.q_names
-    assert len(names) == model.nq and names[-1] == "wire.s" == model.layout.q_name(model.nq - 1)
-    assert model.layout.u_names[-1] == "wire.s_rate" == model.layout.u_name(model.nu - 1)
+    names = model.coordinate_layout.q_names
+    assert len(names) == model.nq and names[-1] == "wire.s" == model.coordinate_layout.q_name(
+        model.nq - 1
+    )
+    assert (
+        model.coordinate_layout.u_names[-1]
+        == "wire.s_rate"
+        == model.coordinate_layout.u_name(model.nu - 1)
+    )
     result = model.simulate(0.1, "dop853")
     again = mstmm.load_result(result.save(tmp_path / "run.nc"))
     assert np.array_equal(again.q, result.q) and again.q.shape[1] == model.nq

@@ -37,7 +37,7 @@ def test_a_bead() -> None:
     wanted = 0.3 * (result.acceleration("bead") + UP)
     assert worst(quantity(result, "wire.force"), wanted) < 1e-11
     assert worst(quantity(result, "wire.s"), result.q[:, 7]) == 0
-    assert "wire.load" not in result.names()
+    assert "wire.load" not in result.quantity_names()
 
 
 def test_a_rod() -> None:

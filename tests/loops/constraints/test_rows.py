@@ -100,7 +100,7 @@ def test_a_rolling_disc_against_kane() -> None:
     """Twenty states: the angular acceleration, seen from the disc."""
     model, rng = disc(), np.random.default_rng(2)
     assert (model.loops.rank, model.loops.mobility) == (3, 3)
-    assert model.loops.rows == (("road", "x"), ("road", "y"), ("road", "normal"))
+    assert model.loops.constraint_rows == (("road", "x"), ("road", "y"), ("road", "normal"))
     for _ in range(20):
         yaw, lean, turn = rng.uniform([-3, -1.2, -3], [3, 1.2, 3])
         u = rng.uniform(-5, 5, 3)

@@ -78,7 +78,7 @@ def test_derivatives() -> None:
     scene, q, u = random_coupled(6)
     model = mstmm.compile(mstmm.Scene(**copy.deepcopy(scene)))
     found, draw = model.derivatives(q, u), np.random.default_rng(6)
-    freedom = model.freedom
+    freedom = model.independent_speeds
     assert freedom is not None
     ways = freedom.following(q, freedom.places)
     moved, faster = ways @ draw.normal(size=ways.shape[1]), draw.normal(size=model.nu)

@@ -21,7 +21,7 @@ def test_gear_pair() -> None:
     wanted = (-3 * 1.5 - 0.1 * 0.7) / (9 * 0.02 + 0.3)
     found = model.accelerations([0.2, -0.1], [-2.1, 0.7])
     assert np.abs(found - wanted * np.array([-3.0, 1.0])).max() < 1e-14
-    assert model.loops.rows == (("gear", "expression"),) and model.loops.mobility == 1
+    assert model.loops.constraint_rows == (("gear", "expression"),) and model.loops.mobility == 1
 
 
 def test_rack_and_pinion() -> None:
@@ -43,7 +43,7 @@ def test_screw() -> None:
              "axis": [0, 0, 1]}  # fmt: skip
     row = {"expression": f"S.displacement - {lead}*S.angle"}
     model = coupled([nut], [hinge], row, gravity=[0, 0, -9.81])
-    names = [str(name) for name in model.layout.hinges["S"].q_names]
+    names = [str(name) for name in model.coordinate_layout.hinges["S"].q_names]
     fall = -9.81 / (1 + 0.01 / (2.0 * lead**2))
     wanted = {"displacement": fall, "angle": fall / lead}
     found = dict(zip(names, model.accelerations([0, 0], [0, 0]), strict=True))
@@ -68,7 +68,9 @@ def test_planetary_gear() -> None:
     """Two speeds are left, whatever the number of planets; sun and carrier by Lagrange."""
     efforts = {"sun": 0.3, "ring": -0.7, "carrier": 0.2}
     model = planetary(efforts)
-    assert model.loops.mobility == 2 and model.loops.rank == 4 and len(model.loops.redundant) == 2
+    assert (
+        model.loops.mobility == 2 and model.loops.rank == 4 and len(model.loops.redundant_rows) == 2
+    )
     ratios = np.array([[1, 0], [-SUN / RING, 1 + SUN / RING], [0, 1]])
     free = np.linalg.solve(inertia(ratios), ratios.T @ [*efforts.values()])
     turns = np.vstack([ratios, [[-SUN / PLANET, 1 + SUN / PLANET]] * 3]) @ free
@@ -131,7 +133,9 @@ def test_a_drive_at_a_time() -> None:
 def test_couplings_that_repeat_others() -> None:
     twice = {"expression": "2*A.q + 6*B.q"}
     model = pair(GEAR, twice)
-    assert model.loops.redundant == (("coupling2", "expression"),) and model.loops.mobility == 1
+    assert (
+        model.loops.redundant_rows == (("coupling2", "expression"),) and model.loops.mobility == 1
+    )
     assert model.loops.rank == 1
 
 

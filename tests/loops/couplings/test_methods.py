@@ -42,7 +42,7 @@ def test_stiff_teeth_turn_auto_to_an_implicit_method() -> None:
         {"sun": 1.0}, ring={"stiffness": 1.0}, carrier={"stiffness": 1e7, "damping": 1e3}
     )  # fmt: skip
     result = model.simulate(0.5, "auto", rtol=1e-6, output_times=[0.0, 0.5])
-    assert [one.method for one in result.methods] == ["dop853", "rodas5p"]
+    assert [one.method for one in result.method_history] == ["dop853", "rodas5p"]
     held = model.simulate(0.5, "rodas5p", rtol=1e-9, output_times=[0.0, 0.5])
     assert np.abs(result.q[-1] - held.q[-1]).max() < 1e-5
 
@@ -111,7 +111,7 @@ def test_a_curved_coupling_at_rest() -> None:
 def test_motors_of_a_planetary_gear() -> None:
     """Efforts by Lagrange of any two of its three shafts, which have the same power."""
     model = planetary({})
-    independent = [name.partition(".")[0] for name in model.loops.independent]
+    independent = [name.partition(".")[0] for name in model.loops.independent_speeds]
     assert independent == ["sun", "ring"]
     q, u = model.initial_state()
     ratios = np.array([[1, 0], [0, 1], [SUN / (SUN + RING), RING / (SUN + RING)]])
@@ -167,7 +167,7 @@ def test_torsional_frequencies_of_a_planetary_gear() -> None:
     ratios = np.array([[1, 0], [0, 1], [SUN / (SUN + RING), RING / (SUN + RING)]])
     mass, stiffness = inertia(ratios), ratios.T @ np.diag([3.0, 0.0, 20.0]) @ ratios
     linear = model.linearize()
-    assert linear.coordinates == ("sun.angle", "ring.angle")
+    assert linear.coordinate_names == ("sun.angle", "ring.angle")
     assert np.abs(linear.M / mass - 1).max() < 1e-12
     assert np.abs(linear.K - stiffness).max() < 1e-12
     omega = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(mass, stiffness)).real))
@@ -179,7 +179,7 @@ def test_torsional_frequencies_of_a_planetary_gear() -> None:
         ratios[2] @ np.linalg.solve(stiffness + 1j * w * damping - w * w * mass, [1.0, 0.0])
         for w in at
     ]
-    assert np.abs(found.values[:, 0, 0] / wanted - 1).max() < 1e-10
+    assert np.abs(found.response[:, 0, 0] / wanted - 1).max() < 1e-10
 
 
 def test_loads_of_curved_couplings_have_stiffness() -> None:
@@ -227,7 +227,7 @@ _GEAR, _FELT = {"expression": "A.q + 2*B.q"}, 0.095
 def test_couplings_that_go_by_time_leave_one_speed_free() -> None:
     model = pair(_GEAR | {"equals": "0.1*t"})
     q, u = model.initial_state()
-    assert model.loops.independent == ("A.angle_rate",)
+    assert model.loops.independent_speeds == ("A.angle_rate",)
     assert model.mass_matrix(q) == pytest.approx(np.array([[_FELT]]), rel=1e-12)
     pushed = model.inverse_dynamics(q, u, np.zeros(2), actuators=["A"])
     assert pushed == pytest.approx(np.zeros(2), abs=1e-12)
@@ -238,7 +238,7 @@ def test_modal_damping_of_a_pair_is_that_of_the_pair() -> None:
     model = pair(_GEAR, a={"law": {"stiffness": 20.0}})
     found = model.frequency_response([2.0], ["A.effort"], ["A.angle"], modal=0.02)
     stiff = 20.0 - _FELT * 4 + 2j * 0.02 * 2.0 * np.sqrt(20.0 * _FELT)
-    assert 1 / found.values[0, 0, 0] == pytest.approx(stiff, rel=1e-10)
+    assert 1 / found.response[0, 0, 0] == pytest.approx(stiff, rel=1e-10)
 
 
 def test_a_coupling_has_a_name_of_its_own() -> None:

@@ -104,7 +104,7 @@ def test_a_sleigh() -> None:
     hinge = {"name": "P", "type": "planar", "inboard": "ground", "outboard": "sleigh",
              "initial": {"u": [1.0, 0.0, 1.5]}}  # fmt: skip
     model = coupled([body], [hinge], {"speeds": "cos(P.q[2])*P.u[1] - sin(P.q[2])*P.u[0]"})
-    assert model.loops.mobility == 2 and model.loops.rows == (("coupling1", "speeds"),)
+    assert model.loops.mobility == 2 and model.loops.constraint_rows == (("coupling1", "speeds"),)
     result = model.simulate(3.0, "dop853", rtol=1e-11, output_times=[0.0, 1.5, 3.0])
     assert result.success, result.message
 

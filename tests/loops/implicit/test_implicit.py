@@ -144,11 +144,11 @@ def test_choice() -> None:
     """A stiff mechanism goes on by implicit steps, a slack one by explicit ones."""
     model = mstmm.compile(mstmm.Scene(**slider(1e9)))
     result = model.simulate(0.3, "auto", rtol=1e-5, output_times=[0.0, 0.3])
-    assert [one.method for one in result.methods][:2] == ["dop853", "rodas4p2"]
+    assert [one.method for one in result.method_history][:2] == ["dop853", "rodas4p2"]
     wanted = model.simulate(0.3, "rodas5p", rtol=1e-9, output_times=[0.0, 0.3])
     assert np.abs(result.q[-1] - wanted.q[-1]).max() < 1e-6
     slack = mstmm.compile(mstmm.Scene(**four_bar())).simulate(0.3, "auto", rtol=1e-5)
-    assert [one.method for one in slack.methods] == ["dop853"]
+    assert [one.method for one in slack.method_history] == ["dop853"]
 
 
 def test_error_asked_for() -> None:

@@ -125,7 +125,7 @@ def test_beside_loops_that_are_closed_behind_steps() -> None:
         for steps in (80, 160):
             run = model.simulate(end, method, step=end / steps, output_times=[0.0, end])
             assert run.success, run.message
-            closure = run.certificate.closure
+            closure = run.certificate.loop_closure
             assert closure is not None and closure.gap < 1e-14
             assert ("which steps on positions leave" in str(closure)) == ("index3" in method)
             errors.append(float(np.abs(run.q[-1] - wanted.q[-1]).max()))
@@ -146,7 +146,7 @@ def test_energy_falls_as_slowly() -> None:
         for radius in (0.5, 0.9):
             run = model.simulate(20.0, method, step=5e-3, radius=radius, output_times=[0.0, 20.0])
             assert run.success, run.message
-            energy = run.energies()["kinetic"]
+            energy = run.energy_components()["kinetic"]
             lost[method, radius] = 1 - float(energy[1] / energy[0])
     print(lost)
     for radius in (0.5, 0.9):
@@ -294,7 +294,7 @@ def test_constraints_and_couplings_of_coordinates(name: str) -> None:
     wanted = model.simulate(0.2, rtol=1e-11, output_times=[0.2]).q[-1]
     runs = [model.simulate(0.2, "genalpha-index3", step=step) for step in (2e-3, 1e-3)]
     for run in runs:
-        closure = run.certificate.closure
+        closure = run.certificate.loop_closure
         assert run.success and closure is not None and closure.gap < 1e-13
     errors = [float(np.abs(run.q[-1] - wanted).max()) for run in runs]
     print(errors)

@@ -42,8 +42,8 @@ def test_a_platform_that_moves_is_a_ground_that_moves(cut: str) -> None:
     """Coordinates answer to a motion as to the acceleration of the ground that it is."""
     outputs = ["foot.angle", "tip.angle_rate", "end.angle_acceleration"]
     moved, still = compiled(on_a_platform(cut)), compiled(sprung(cut))
-    found = moved.frequency_response(OMEGA, ["road"], outputs).values
-    pushed = still.frequency_response(OMEGA, ["ground.acceleration.y"], outputs).values
+    found = moved.frequency_response(OMEGA, ["road"], outputs).response
+    pushed = still.frequency_response(OMEGA, ["ground.acceleration.y"], outputs).response
     wanted = -(OMEGA**2)[:, None, None] * pushed
     assert np.abs(found - wanted).max() < 1e-10 * np.abs(wanted).max()
 
@@ -78,31 +78,33 @@ def driven() -> mstmm.Model:
 def test_equilibria_follow_the_drive(driven: mstmm.Model) -> None:
     """K x = - K_d d, by central differences between equilibria."""
     linear = driven.linearize(inputs=["foot1.angle_acceleration"])
-    q, size, place = np.asarray(linear.state.q), 1e-4, linear.free[0]
+    q, size, place = np.asarray(linear.state.q), 1e-4, linear.free_speed_indices[0]
     ends = [turned(1.0 + s * size, 0, 0).equilibrium(q) for s in (1, -1)]
     slope = (ends[0] - ends[1])[place] / (2 * size)
-    wanted = -np.linalg.solve(linear.K, linear.K_driven)[0, 0]
+    wanted = -np.linalg.solve(linear.K, linear.K_prescribed)[0, 0]
     assert abs(slope / wanted - 1) < 1e-6
-    slow = driven.frequency_response([1e-6], ["turn"], [linear.coordinates[0]]).values[0, 0, 0]
+    slow = driven.frequency_response([1e-6], ["turn"], [linear.coordinate_names[0]]).response[
+        0, 0, 0
+    ]
     assert abs(slow.real / wanted - 1) < 1e-9
 
 
 def test_accelerations_follow_the_drive(driven: mstmm.Model) -> None:
     """M x'' = - M_d d'' - C_d d', the second by central differences."""
     linear = driven.linearize(inputs=["foot1.angle_acceleration"])
-    q, place = np.asarray(linear.state.q), linear.free[0]
-    mechanism = linear.mechanism
+    q, place = np.asarray(linear.state.q), linear.free_speed_indices[0]
+    mechanism = linear.constrained_motion
     assert mechanism is not None
     still = np.zeros(driven.nu)
     pushed = turned(1.0, 0, 1.0).accelerations(q, still)[place]
     assert abs(pushed / np.linalg.solve(linear.M, linear.V)[0, 0] - 1) < 1e-9
-    rows = mechanism.rows(linear.state, {0: np.eye(driven.nu)}, [linear.drives[0]])[0]
-    along = rows[:, linear.drives[0]]
+    rows = mechanism.rows(linear.state, {0: np.eye(driven.nu)}, [linear.drive_indices[0]])[0]
+    along = rows[:, linear.drive_indices[0]]
     size = 1e-4
     going = [turned(1.0, s * size, 0).accelerations(q, s * size * along)[place]
              for s in (1, -1)]  # fmt: skip
     slope = (going[0] - going[1]) / (2 * size)
-    wanted = -np.linalg.solve(linear.M, linear.C_driven)[0, 0]
+    wanted = -np.linalg.solve(linear.M, linear.C_prescribed)[0, 0]
     assert abs(slope / wanted - 1) < 1e-6
 
 
@@ -112,7 +114,7 @@ def test_states_and_frequencies_agree(driven: mstmm.Model) -> None:
                "knee0.angle_acceleration", "foot1.angle"]  # fmt: skip
     linear = driven.linearize(inputs=["foot1.angle_acceleration"])
     c, d = linear.output_matrices(outputs)
-    found = driven.frequency_response(OMEGA, ["turn"], outputs).values
+    found = driven.frequency_response(OMEGA, ["turn"], outputs).response
     for k, s in enumerate(1j * OMEGA):
         states = np.linalg.solve(s * np.eye(len(linear.A)) - linear.A, linear.B)
         wanted = (c @ states + d) * s**2
@@ -122,10 +124,10 @@ def test_states_and_frequencies_agree(driven: mstmm.Model) -> None:
 
 def test_a_driven_hinge_may_be_the_cut_one(driven: mstmm.Model) -> None:
     other = turned(1.0, 0, 0, cut="foot1")
-    assert "foot1" in other.loops.cut
+    assert "foot1" in other.loops.cut_hinges
     outputs = ["foot0.angle", "link1.tip.velocity.y"]
     here, there = (one.frequency_response(OMEGA, ["turn"], outputs) for one in (driven, other))
-    assert np.abs(here.values - there.values).max() < 1e-8 * np.abs(here.values).max()
+    assert np.abs(here.response - there.response).max() < 1e-8 * np.abs(here.response).max()
 
 
 def test_a_driven_crank_leaves_nothing_but_kinematics() -> None:
@@ -134,4 +136,4 @@ def test_a_driven_crank_leaves_nothing_but_kinematics() -> None:
     turn = {"name": "turn", "unit": "rad", "value": 0.6, "rates": [0, 0]}
     found = compiled(scene | {"input": [turn]}).frequency_response([2.0], ["turn"], ["end.angle"])
     slope = (angles(0.6 + 1e-4)[1] - angles(0.6 - 1e-4)[1]) / 2e-4
-    assert abs(found.values[0, 0, 0] - slope) < 1e-7
+    assert abs(found.response[0, 0, 0] - slope) < 1e-7

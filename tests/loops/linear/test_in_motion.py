@@ -87,9 +87,9 @@ def test_slopes_along_closed_motions(scene: str) -> None:
     make, speeds = MOVING[scene]
     model = make()
     q, u = model.initial_state()
-    freedom = model.freedom
+    freedom = model.independent_speeds
     assert freedom is not None
-    places = list(freedom.chosen(q))
+    places = list(freedom.select(q))
     u = u + freedom.following(q, places) @ (np.resize(speeds, len(places)) - u[places])
 
     def closed(q: Array) -> tuple[Array, Array]:
@@ -99,9 +99,9 @@ def test_slopes_along_closed_motions(scene: str) -> None:
 
     q, u = closed(q)
     linear = model.linearize(q, u)
-    n, loops, memory = len(linear), linear.mechanism, model.looped.start_memory()
-    assert loops is not None and list(linear.free) == places
-    assert (linear.turning is not None) == (scene == "on balls")
+    n, loops, memory = len(linear), linear.constrained_motion, model.looped.start_memory()
+    assert loops is not None and list(linear.free_speed_indices) == places
+    assert (linear.rate_matrix is not None) == (scene == "on balls")
 
     def beside(x: Array, dv: Array) -> Array:
         """All speeds, and the accelerations of the independent ones."""
@@ -116,15 +116,17 @@ def test_slopes_along_closed_motions(scene: str) -> None:
             ahead, behind = (beside(s * pair[0], s * pair[1]) for s in (1, -1))
             found.append((ahead - behind) / (2 * STEP))
     by_x, by_v = np.array(found[::2]).T, np.array(found[1::2]).T
-    turn = np.zeros((n, n)) if linear.turning is None else linear.turning
+    turn = np.zeros((n, n)) if linear.rate_matrix is None else linear.rate_matrix
     down, rate = linear.A[n:, :n], linear.A[n:, n:]
     assert worst(by_x[model.nu :], down + rate @ turn - turn @ turn) < 1e-6
     assert worst(by_v[model.nu :], rate - turn) < 1e-7
     names = [
-        name for name in model.layout.u_names if name.rpartition(".")[0] in model.layout.hinges
+        name
+        for name in model.coordinate_layout.u_names
+        if name.rpartition(".")[0] in model.coordinate_layout.hinges
     ]
     rates = linear.output_matrices(names)[0]
-    kept = [model.layout.u_names.index(name) for name in names]
+    kept = [model.coordinate_layout.u_names.index(name) for name in names]
     assert worst(by_x[kept], rates[:, :n] + rates[:, n:] @ turn, floor=1.0) < 1e-6
     assert worst(by_v[kept], rates[:, n:]) < 1e-7
 
@@ -183,13 +185,13 @@ def test_a_governor_turns_freely() -> None:
     assert not any("does not last" in warning for warning in linear.warnings)
     modes = linear.modes()
     assert modes.omega[-1] ** 2 == pytest.approx(free, rel=1e-9)
-    assert worst(linear.gyroscopic, linear.C) < 1e-12
+    assert worst(linear.C_gyroscopic, linear.C) < 1e-12
     omega, outputs = np.array([2.0, 9.0, 31.0]), ["knee.angle", "spin.angle_rate", "arm.tip.y"]
     found = linear.frequency_response(omega, outputs=outputs)
     c, d = linear.output_matrices(outputs)
     for k, s in enumerate(1j * omega):
         wanted = c @ np.linalg.solve(s * np.eye(len(linear.A)) - linear.A, linear.B) + d
-        assert np.abs(found.values[k] - wanted).max() < 1e-9 * np.abs(wanted).max()
+        assert np.abs(found.response[k] - wanted).max() < 1e-9 * np.abs(wanted).max()
 
 
 def test_a_governor_is_turned() -> None:
@@ -210,13 +212,13 @@ def test_parts_of_a_motion() -> None:
     q, u = sprung.initial_state()[0], np.zeros(sprung.nu)
     u[0] = steady(0.7)[0]
     here, there = sprung.linearize(q, u), bare.linearize(q, u)
-    place = here.free.index(1)
+    place = here.free_speed_indices.index(1)
     spring, damper = (np.zeros((2, 2)) for _ in range(2))
     spring[place, place], damper[place, place] = 5.0, 0.3
-    assert worst(here.elastic, spring) < 1e-11 and worst(here.damping, damper) < 1e-11
-    assert worst(here.geometric, there.K) < 1e-9 and worst(here.gyroscopic, there.C) < 1e-9
-    assert worst(here.elastic + here.geometric + here.load, here.K) < 1e-12
-    assert here.modes(damped=False).strain()["swing"].max() == pytest.approx(1.0)
+    assert worst(here.K_elastic, spring) < 1e-11 and worst(here.C_damping, damper) < 1e-11
+    assert worst(here.K_geometric, there.K) < 1e-9 and worst(here.C_gyroscopic, there.C) < 1e-9
+    assert worst(here.K_elastic + here.K_geometric + here.K_load, here.K) < 1e-12
+    assert here.modes(damped=False).strain_energy_shares()["swing"].max() == pytest.approx(1.0)
 
 
 def test_a_drive_that_drags_loops_along_leaves_no_rest() -> None:

@@ -80,7 +80,7 @@ def benchmark(**steering: Any) -> mstmm.Model:
 
 def riding(model: mstmm.Model, speed: float, heading: float = 0.0) -> tuple[Array, Array]:
     """q and u straight ahead along a heading."""
-    q, u, hinges = np.zeros(model.nq), np.zeros(model.nu), model.layout.hinges
+    q, u, hinges = np.zeros(model.nq), np.zeros(model.nu), model.coordinate_layout.hinges
     q[3], q[6] = np.cos(heading / 2), np.sin(heading / 2)
     for name, rate in (("ride", speed), ("hub", speed / REAR), ("spin", speed / FRONT)):
         u[hinges[name].u] = rate
@@ -107,10 +107,10 @@ def test_the_benchmark_bicycle(bicycle: mstmm.Model, speed: float, heading: floa
         assert paired(moving, np.array(table)) < 1e-8
         modes = linear.modes()
         assert [x for x in modes.eigenvalues if x] == pytest.approx([CAPSIZE, WEAVE, CASTER])
-        assert modes.trusted and not modes.growing.any()
-        assert set(modes.moving(len(modes) - 1)) >= {"steer.angle"}
+        assert modes.trusted and not modes.unstable.any()
+        assert set(modes.dominant_coordinates(len(modes) - 1)) >= {"steer.angle"}
         assert beside(linear).frame_rates == {}
-        assert linear.coordinates[-2:] == ("steer.angle", "spin.angle")
+        assert linear.coordinate_names[-2:] == ("steer.angle", "spin.angle")
 
 
 def test_steering_torque_turns_the_bicycle(bicycle: mstmm.Model) -> None:
@@ -118,7 +118,7 @@ def test_steering_torque_turns_the_bicycle(bicycle: mstmm.Model) -> None:
     linear = bicycle.linearize(*riding(bicycle, 5.0), inputs=["steer.effort"])
     omega = np.array([0.5, 3.0, 20.0])
     outputs = ["steer.angle", "steer.angle_rate", "steer.angle_acceleration", "ride.wx"]
-    found = linear.frequency_response(omega, outputs=outputs).values[:, :, 0]
+    found = linear.frequency_response(omega, outputs=outputs).response[:, :, 0]
     for w, row in zip(omega, found, strict=True):
         z = -(w**2) * MASS + 5j * w * DAMPING + GRAVITY * STIFFNESS + 25 * BY_SPEED
         lean, steer = np.linalg.solve(z, [0.0, 1.0])
@@ -128,7 +128,7 @@ def test_steering_torque_turns_the_bicycle(bicycle: mstmm.Model) -> None:
     driven = bicycle.linearize(*riding(bicycle, 5.0), inputs=["frame.fy"])
     assert not driven.B.any()  # it acts where the wheel stands on the road
     assert any("has no effect" in text for text in driven.warnings)
-    assert linear.output_matrices(["steer.angle"])[0].shape == (1, len(linear.states))
+    assert linear.output_matrices(["steer.angle"])[0].shape == (1, len(linear.state_names))
 
 
 def test_dry_friction_of_the_steering_is_left_out_or_counts_as_viscous() -> None:
@@ -174,7 +174,7 @@ def test_an_upright_disc_is_stable_above_a_third_of_g_r(speed: float, turned: fl
     modes = linear.modes()
     (found,) = [x for x in modes.eigenvalues if x.imag] or [max(modes.eigenvalues, key=np.real)]
     assert found == pytest.approx(np.sqrt(complex(square)), rel=1e-9)
-    assert modes.growing.any() == (speed**2 < GRAVITY * RADIUS / 3)
+    assert modes.unstable.any() == (speed**2 < GRAVITY * RADIUS / 3)
     assert beside(linear).frame_rates["fly"] == pytest.approx([0, spin, 0], abs=1e-12)
     names = {risk.name for risk in linear.risks}
     assert names <= {"unrestrained", "unstable"} and linear.trusted
@@ -251,7 +251,7 @@ def test_a_disc_on_pins_rolls_in_a_circle(lean: float = 0.3, yaw: float = 1.5) -
     q = [0, 0, RADIUS * np.cos(lean), heading, lean, 0.2]
     linear = coin_on_pins(lean).linearize(q, u, inputs=[])
     assert np.abs(linear.modes().eigenvalues - wobble).min() < 1e-9
-    assert linear.trusted and np.abs(linear.state.a[:2]).min() > 0.5
+    assert linear.trusted and np.abs(linear.state.udot[:2]).min() > 0.5
 
 
 def test_a_disc_that_is_not_round_in_its_inertia_is_told() -> None:
@@ -259,11 +259,11 @@ def test_a_disc_that_is_not_round_in_its_inertia_is_told() -> None:
     speed = 2.0
     state = [0, 0, RADIUS, 1, 0, 0, 0], [speed, 0, 0, 0, speed / RADIUS, 0]
     egg = coin(inertia=[0.05, 0.125, 0.075]).linearize(*state, inputs=["fly.effort_wx"])
-    assert [risk.name for risk in egg.risks if risk.doubt] == ["changing-coefficients"]
+    assert [risk.name for risk in egg.risks if risk.invalidates] == ["changing-coefficients"]
     with pytest.raises(SceneError, match="along the motion changes the matrices"):
         egg.frequency_response([1.0], outputs=["fly.wy"])
     heavy = coin(center_of_mass=[0.1, 0, 0]).linearize(*state, inputs=[])
-    assert [risk.name for risk in heavy.risks if risk.doubt] == ["unsteady-state"]
+    assert [risk.name for risk in heavy.risks if risk.invalidates] == ["unsteady-state"]
 
 
 # --- rows of speeds -------------------------------------------------------------------------------
@@ -291,7 +291,7 @@ def test_chaplygins_sleigh(speed: float, heading: float) -> None:
     linear = model.linearize([0.0, 0.0, heading], u, inputs=[])
     (found,) = [x for x in linear.modes().eigenvalues if x]
     assert found == pytest.approx(-mass * arm * speed / (inertia + mass * arm**2), rel=1e-11)
-    assert linear.coordinates == ("x.displacement", "y.displacement", "yaw.angle")
+    assert linear.coordinate_names == ("x.displacement", "y.displacement", "yaw.angle")
     assert len(beside(linear).speeds) == 2 and linear.trusted
 
 

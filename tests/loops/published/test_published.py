@@ -124,9 +124,9 @@ def test_andrews_squeezer(rtol: float, angle: float, speed: float, most: int) ->
     assert result.success, result.message
     assert result.statistics is not None and result.statistics.evaluations < most
     for name, wanted in PRINTED.items():
-        assert abs(result.q[-1, model.layout.hinges[name].q] - wanted) < angle, name
+        assert abs(result.q[-1, model.coordinate_layout.hinges[name].q] - wanted) < angle, name
     for name, wanted in PRINTED_SPEEDS.items():
-        found = result.u[-1, model.layout.hinges[name].u]
+        found = result.u[-1, model.coordinate_layout.hinges[name].u]
         assert abs(found - wanted) < speed * abs(wanted), name
 
 
@@ -137,11 +137,13 @@ def test_two_trees_of_the_squeezer_agree() -> None:
     for cuts in (("E3", "E4", "E6"), ("gamma", "Phi", "Omega")):
         scene = andrews()
         for hinge in scene["hinge"]:
-            place = first.layout.hinges[hinge["name"]].q
+            place = first.coordinate_layout.hinges[hinge["name"]].q
             hinge |= {"initial": {"q": float(start[place])}, "cut": hinge["name"] in cuts}
         model = mstmm.compile(mstmm.Scene(**scene))
-        assert set(model.loops.cut) == set(cuts)
+        assert set(model.loops.cut_hinges) == set(cuts)
         result = model.simulate(0.03, "dop853", rtol=1e-13, atol=1e-16, output_times=[0.0, 0.03])
         assert result.success, result.message
-        ends.append([result.q[-1, model.layout.hinges[name].q] for name in ("beta", "Theta")])
+        ends.append(
+            [result.q[-1, model.coordinate_layout.hinges[name].q] for name in ("beta", "Theta")]
+        )
     assert np.abs(np.subtract(ends[0], ends[1])).max() < 2e-12

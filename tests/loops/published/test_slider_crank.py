@@ -78,7 +78,7 @@ def angles() -> np.ndarray:
 def test_the_start_is_that_of_the_library() -> None:
     """At 6 rad/s the slider begins at 0.2 m with 0.24 m/s."""
     model = mstmm.compile(slider_crank())
-    assert (model.loops.rank, len(model.loops.rows), model.loops.mobility) == (3, 3, 2)
+    assert (model.loops.rank, len(model.loops.constraint_rows), model.loops.mobility) == (3, 3, 2)
     result = model.simulate(0.0)
     assert abs(result.position("slider")[0, 0] - 0.2) < 1e-12
     assert np.abs(result.velocity("slider")[0] - [0.24, 0, 0]).max() < 1e-12

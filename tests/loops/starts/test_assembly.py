@@ -78,9 +78,12 @@ def test_what_cannot_close_is_told_with_the_least_gap() -> None:
 def test_assemble_near_any_state() -> None:
     model = mstmm.compile(mstmm.Scene(**linkage("rocker_pin", laws=False)))
     wish = model.initial_state()[0]
-    wish[model.layout.hinges["crank_pin"].q] = 1.3
+    wish[model.coordinate_layout.hinges["crank_pin"].q] = 1.3
     q, u = model.assemble(wish, np.zeros(model.nu), hold=["crank_pin"])
-    assert np.abs(np.array([q[model.layout.hinges[n].q] for n in PINS]) - angles(1.3)).max() < 1e-9
+    assert (
+        np.abs(np.array([q[model.coordinate_layout.hinges[n].q] for n in PINS]) - angles(1.3)).max()
+        < 1e-9
+    )
     assert not u.any()
     with pytest.raises(mstmm.SceneError, match='hold: there is no hinge "crank"'):
         model.assemble(hold=["crank"])

@@ -78,7 +78,7 @@ def wrapped(angle: Array | float) -> Any:
 
 def off(model: mstmm.Model, q: Array, wanted: dict[str, float]) -> float:
     """The largest angle by which a state is not as wanted."""
-    slots = model.layout.hinges
+    slots = model.coordinate_layout.hinges
     return max(abs(float(wrapped(q[slots[name].q] - angle))) for name, angle in wanted.items())
 
 
@@ -144,9 +144,9 @@ def test_a_state_on_another_branch() -> None:
     q = np.array(model.initial_state()[0])
     for number, side in enumerate((1, -1)):
         for crank in (0.4, 3.0, -2.5):
-            q[model.layout.hinges["foot"].q] = crank
+            q[model.coordinate_layout.hinges["foot"].q] = crank
             found, _ = model.assemble(q, hold=["foot"], branch=number)
-            assert found[model.layout.hinges["foot"].q] == crank
+            assert found[model.coordinate_layout.hinges["foot"].q] == crank
             assert off(model, found, angles(crank, (side,))) < 1e-9
     impossible: list[Any] = [2, -1, True, 1.0]
     for number in impossible:
@@ -158,11 +158,13 @@ def test_a_path_stays_on_its_branch() -> None:
     """A whole turn of the crank, in steps that are too long for one leap."""
     model = mstmm.compile(mstmm.Scene(**linkage(angles(0.4, (1,)))))
     rows = np.tile(model.initial_state()[0], (9, 1))
-    rows[:, model.layout.hinges["foot"].q] = 0.4 + np.linspace(0, 2 * np.pi, 9)
+    rows[:, model.coordinate_layout.hinges["foot"].q] = 0.4 + np.linspace(0, 2 * np.pi, 9)
     for number, side in enumerate((1, -1)):
         found = model.assemble_path(rows, ["foot"], number)
         for row, q in zip(rows, found, strict=True):
-            assert off(model, q, angles(row[model.layout.hinges["foot"].q], (side,))) < 1e-9
+            assert (
+                off(model, q, angles(row[model.coordinate_layout.hinges["foot"].q], (side,))) < 1e-9
+            )
 
 
 def test_the_state_nearest_to_what_is_asked() -> None:
@@ -172,7 +174,7 @@ def test_the_state_nearest_to_what_is_asked() -> None:
         wanted = angles(crank, (side,))
         q = np.zeros(model.nq)
         for name, angle in wanted.items():
-            q[model.layout.hinges[name].q] = angle + 0.1 * (name == "knee")
+            q[model.coordinate_layout.hinges[name].q] = angle + 0.1 * (name == "knee")
         found, _ = model.assemble(q, hold=["foot"])
         assert off(model, found, wanted) < 1e-9
 
@@ -180,6 +182,6 @@ def test_the_state_nearest_to_what_is_asked() -> None:
 def test_a_closed_start_stays_as_it_is() -> None:
     wanted = angles(0.4, (-1,))
     model = mstmm.compile(mstmm.Scene(**linkage(wanted, "tip")))
-    (q, _), slots = model.initial_state(), model.layout.hinges
+    (q, _), slots = model.initial_state(), model.coordinate_layout.hinges
     for name in ("foot", "knee", "heel"):
         assert abs(q[slots[name].q] - wanted[name]) < 1e-15

@@ -54,14 +54,14 @@ def test_rounded_numbers_are_named_as_the_cause(digits: int) -> None:
     found = run(bennett(0.7, 6.0, digits), certify=True)
     risks = {risk.name: risk for risk in found.risks}
     gap = risks["nearly-redundant"]
-    assert gap.figure is not None and 0.1 < gap.figure * 10.0**digits < 1e2
+    assert gap.value is not None and 0.1 < gap.value * 10.0**digits < 1e2
     assert "make the axes and lengths of the loop agree" in gap.remedy
     assert all("rtol" not in risk.remedy for risk in found.risks)
     assert not found.trusted
 
 
 def test_exact_numbers_leave_no_gap() -> None:
-    closure = run(bennett(0.7, 6.0), certify=True).certificate.closure
+    closure = run(bennett(0.7, 6.0), certify=True).certificate.loop_closure
     assert closure is not None and closure.misfit == 0.0
 
 

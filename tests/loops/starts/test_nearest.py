@@ -23,7 +23,7 @@ def off(model: mstmm.Model, kept: tuple[str, ...], size: float, draw: np.random.
     start, _ = model.initial_state()
     shift = draw.uniform(-size, size, len(start))
     for hinge in model.scene.hinge:
-        place = model.layout.hinges[hinge.name].q_slice
+        place = model.coordinate_layout.hinges[hinge.name].q_slice
         if hinge.type == "ball":
             shift[place] /= 2  # of a quaternion half the angle
         if hinge.name in kept:
@@ -51,7 +51,7 @@ def test_every_start_nearby_closes(
     for _ in range(40):
         wish = off(model, kept, size, draw)
         q, u = model.assemble(wish, np.zeros(model.nu), hold=kept)
-        for place in (model.layout.hinges[name].q_slice for name in kept):
+        for place in (model.coordinate_layout.hinges[name].q_slice for name in kept):
             assert (q[place] == wish[place]).all()
         assert gap(model, scene, q, u) < 1e-9
 
@@ -61,7 +61,7 @@ def gap(model: mstmm.Model, scene: dict[str, Any], q: Array, u: Array) -> float:
     result = model.simulate(0.0, initial=(q, u))
     apart = []
     for hinge in scene["hinge"]:
-        if hinge["name"] in model.loops.cut:
+        if hinge["name"] in model.loops.cut_hinges:
             ends = hinge["inboard"], hinge["outboard"]
             sides = [
                 np.array(hinge.get("position", [0, 0, 0]), float) if end == "ground"
@@ -119,7 +119,7 @@ def test_a_hinge_that_is_held_keeps_its_place_cut_or_not(cut: str) -> None:
     foot = next(hinge for hinge in scene["hinge"] if hinge["name"] == "foot")
     foot |= {"hold": True, "initial": {"q": [0.8], "u": [2.0]}}
     model = mstmm.compile(mstmm.Scene(**scene))
-    (q, u), slots = model.initial_state(), model.layout.hinges["foot"]
+    (q, u), slots = model.initial_state(), model.coordinate_layout.hinges["foot"]
     assert abs(q[slots.q]) == 0.8 and abs(u[slots.u]) == 2.0
     moved = np.array(q)
     moved[slots.q] += 0.3

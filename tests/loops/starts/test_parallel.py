@@ -92,7 +92,7 @@ def test_the_way_out(name: str) -> None:
         if hinge["name"] == name:
             hinge.pop("initial")
     loops = mstmm.compile(mstmm.Scene(**scene)).loops
-    assert loops.mobility == 1 and not loops.misfit[0]
+    assert loops.mobility == 1 and not loops.redundancy_gap[0]
 
 
 def slider_crank(rail: dict[str, Any], top: str = "pin") -> dict[str, Any]:

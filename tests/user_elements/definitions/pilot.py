@@ -16,7 +16,7 @@ class Pilot(Hinge):
         turns = rotation_about(2, q.yaw), rotation_about(1, q.pitch), rotation_about(0, q.roll)
         return turns[0] * turns[1] * turns[2]
 
-    def rates(self, q, u, p):
+    def coordinate_rates(self, q, u, p):
         across = sp.sin(q.roll) * u.wy + sp.cos(q.roll) * u.wz
         return sp.Matrix(
             [
@@ -26,8 +26,8 @@ class Pilot(Hinge):
             ]
         )
 
-    def subspace(self, q, p):
+    def motion_subspace(self, q, p):
         return sp.Matrix.vstack(sp.zeros(3, 3), sp.eye(3))
 
-    def singular_when(self, q, p):
+    def singularity_measure(self, q, p):
         return sp.cos(q.pitch)

@@ -20,7 +20,7 @@ def _relative_energy(stiffness: float, **options: Any) -> float:
 CASE = CaseDefinition(
     name="classical-iteration",
     title="Classical method, one solution per step: unresolved stiff motion",
-    why="The trapezoidal rule in absolute coordinates with one linear solution per step moves "
+    cause="The trapezoidal rule in absolute coordinates with one linear solution per step moves "
     "the bodies by the error of the first solution. A scheme that damps fast motion, iterated, "
     "holds up to about a hundred times that stiffness.",
     parameter="stiffness of bushings (stretched by 1 mm)",

@@ -23,7 +23,7 @@ def _energy_change(t_end: float, scheme: str) -> float:
 CASE = CaseDefinition(
     name="newmark-constraints",
     title="Undamped Newmark in absolute coordinates: length of a run",
-    why="Where hinges are constraints at position level, their loads follow the second "
+    cause="Where hinges are constraints at position level, their loads follow the second "
     "difference of positions. The trapezoidal rule keeps every other error of these loads: they "
     "oscillate, grow slowly and then explode, however far the steps are iterated. Schemes that "
     "damp infinitely fast motion avoid this, and hinge coordinates have no such loads.",

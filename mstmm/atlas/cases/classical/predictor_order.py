@@ -52,7 +52,7 @@ def _excess(steps: float, end_of: Callable[[int], Array]) -> float:
 CASE = CaseDefinition(
     name="predictor-order",
     title="One solution per step: a predictor without motion",
-    why="Expanded about the start of a step, the hinge constraints omit the rotation of the "
+    cause="Expanded about the start of a step, the hinge constraints omit the rotation of the "
     "hinge points within the step, an error of second order. Loads depend on the second difference "
     "of that error, and centripetal accelerations are wrong however short the steps are. A "
     "predictor with the accelerations has an error of third order. Second order is measured from "

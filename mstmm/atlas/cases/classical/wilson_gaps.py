@@ -27,7 +27,7 @@ def _largest_gap(step: float, scheme: str) -> float:
 CASE = CaseDefinition(
     name="wilson-gaps",
     title="Wilson's method in absolute coordinates: hinges that open",
-    why="Wilson's collocation satisfies the equations, and with them the constraints, after the "
+    cause="Wilson's collocation satisfies the equations, and with them the constraints, after the "
     "end of the step. The hinges are closed there, but not at the end of the step to which the "
     "method returns. However far a step is iterated, the gaps are of fourth order in the step. "
     "Schemes that satisfy the constraints at the end of the step close them to rounding.",

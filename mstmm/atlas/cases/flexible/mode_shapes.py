@@ -28,7 +28,7 @@ def _error(number: float, shape: Callable[[int, Array], Array]) -> float:
 CASE = CaseDefinition(
     name="mode-shapes",
     title="Mode shapes by hyperbolic functions: their number",
-    why="In the printed form with cosh and sinh a shape is the difference of two numbers that "
+    cause="In the printed form with cosh and sinh a shape is the difference of two numbers that "
     "grow by a factor of 23 per half-wave. At the end of about the eleventh shape no digit of it "
     "is left. The same shape written with exponentials that decay from both ends keeps all digits.",
     parameter="number of the shape",

@@ -38,7 +38,7 @@ def _projected_gap() -> float:
 CASE = CaseDefinition(
     name="baumgarte",
     title="Closed loops with springs and dampers: a four-bar",
-    why="Accelerations that satisfy the constraints leave the position gap of a loop to the "
+    cause="Accelerations that satisfy the constraints leave the position gap of a loop to the "
     "errors of the steps, and it grows. Baumgarte closes it by a spring and a damper, whose rate "
     "the user has to choose. A low rate has little effect. A high one makes the equations stiff, "
     "until the steps are too long for it. Projecting positions and speeds after each step needs no "

@@ -31,7 +31,7 @@ def _error_with_speeds(step: float) -> float:
 CASE = CaseDefinition(
     name="projected-places",
     title="Closed loops with projection of positions only: a four-bar",
-    why="Projected positions make the loop look closed after each step. Its speeds still violate "
+    cause="Projected positions make the loop look closed after each step. Its speeds still violate "
     "the constraints, and the next step follows them: angles of this four-bar have 6 to 18 times "
     "the error of a run with projected speeds. That projection costs one more pass with factors "
     "that are available.",

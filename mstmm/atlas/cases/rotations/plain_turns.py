@@ -64,7 +64,7 @@ def _error(rate: float, additive: bool) -> float:
 CASE = CaseDefinition(
     name="plain-turns",
     title="Finite rotations without the tangent operator",
-    why="The unknown of a body in space is a rotation vector from the predicted attitude; a "
+    cause="The unknown of a body in space is a rotation vector from the predicted attitude; a "
     "change of that vector is a rotation only near zero. With the hinges as constraints, the error "
     "of the linear equations is a gap, which causes loads in the next step. The motion is lost "
     "within a second at steps that are far from long. The tangent operator in the matrices keeps "

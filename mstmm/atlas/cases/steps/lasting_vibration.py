@@ -29,7 +29,7 @@ def _remaining_rodas4p2(steps: float) -> float:
 CASE = CaseDefinition(
     name="lasting-vibration",
     title="A-stable but not L-stable: unresolved vibration remains",
-    why="A method may be stable for any stiffness and still keep most of a vibration far too "
+    cause="A method may be stable for any stiffness and still keep most of a vibration far too "
     "fast for its steps. This one keeps three quarters of it per step, and over about the first "
     "ten steps the vibration hides all other motion. The methods of a run keep next to nothing "
     "(they are L-stable, or damp by a chosen radius).",

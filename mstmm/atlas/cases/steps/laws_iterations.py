@@ -26,7 +26,7 @@ def _iterations_with_choice(rate: float) -> float:
 CASE = CaseDefinition(
     name="laws-iterations",
     title="Iteration with hinge laws only: stiffness due to loads",
-    why="Where a tangent matrix neglects weight, spin and preload, every iteration leaves a "
+    cause="Where a tangent matrix neglects weight, spin and preload, every iteration leaves a "
     "quarter of (step times frequency) squared of the error: from 2 on it diverges. Runs start "
     "with the derivatives of hinge laws, which cost little, observe the convergence of the "
     "iteration, and use the exact tangent where it is slow.",

@@ -42,7 +42,7 @@ def _rodas4pw_error(step: float) -> float:
 CASE = CaseDefinition(
     name="laws-order",
     title="Tangent of hinge laws only: the order of a table",
-    why="Most Rosenbrock tables need the exact tangent for their order. With the derivatives of "
+    cause="Most Rosenbrock tables need the exact tangent for their order. With the derivatives of "
     "springs and dampers only, which cost less, Rodas4 falls to first order, Rodas4P2 and Rodas5P "
     "to second; runs reject that. The tables of W-methods, ROS34PW2 and Rodas4PW, keep their order "
     "with any tangent.",

@@ -18,7 +18,7 @@ def _growth(rate: float, tangent: str) -> float:
 CASE = CaseDefinition(
     name="laws-tangent",
     title="Tangent of hinge laws only: stiffness due to loads",
-    why="Weight, spin and preload make a motion stiff without any spring. A linearisation with "
+    cause="Weight, spin and preload make a motion stiff without any spring. A linearisation with "
     "the derivatives of springs and dampers only does not include that stiffness; a Rosenbrock "
     "method is then explicit in that direction. The exact tangent includes it.",
     parameter="step times angular frequency of a hanging rod",

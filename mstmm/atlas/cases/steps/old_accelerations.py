@@ -29,7 +29,7 @@ def _error(step: float, use_old: bool) -> float:
 CASE = CaseDefinition(
     name="old-accelerations",
     title="Accelerations from before an event: rods that are released",
-    why="Steps with accelerations as unknowns start from those of the step before. After a "
+    cause="Steps with accelerations as unknowns start from those of the step before. After a "
     "release, an impact or a sudden load these belong to other equations: the tangent is that of a "
     "wrong state. The first step then has a lasting error of lower order. Here two rods are "
     "released whose accelerations were zero before. One evaluation corrects them; every run makes "

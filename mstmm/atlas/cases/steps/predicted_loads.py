@@ -20,7 +20,7 @@ def _relative_energy(stiffness: float, method: str, **options: Any) -> float:
 CASE = CaseDefinition(
     name="predicted-loads",
     title="One linearised equation per step: rotation of predicted loads",
-    why="A predictor has an error of third order in the length of a spring, and the load there "
+    cause="A predictor has an error of third order in the length of a spring, and the load there "
     "has that error times the stiffness. The rotation of loads with their bodies is linearised "
     "about this load. Slack springs carry some 40 N, but the predicted load is of the order of "
     "meganewtons, and it disturbs the next step as well. Runs stop at the pivot that changes its "

@@ -17,7 +17,7 @@ def _growth(damping: float, method: str) -> float:
 CASE = CaseDefinition(
     name="rk4-damping",
     title="Explicit steps: strength of a damper",
-    why="A strong damper stops a motion within a time that is unrelated to the motion that "
+    cause="A strong damper stops a motion within a time that is unrelated to the motion that "
     "follows. Explicit steps must still be shorter than 2.785 times that time, or they are "
     "unstable; implicit ones need not resolve it.",
     parameter="damping of a rod's pin", unit="N m s/rad", low=1.0, high=1e8, scale=LOG_SCALE,

@@ -17,7 +17,7 @@ def _growth(stiffness: float, method: str) -> float:
 CASE = CaseDefinition(
     name="rk4-stiffness",
     title="Explicit steps: stiffness of a spring",
-    why="An explicit step must resolve the fastest vibration whether it is wanted or not. The "
+    cause="An explicit step must resolve the fastest vibration whether it is wanted or not. The "
     "classical Runge-Kutta method is stable as long as the step times its angular frequency is "
     "below the square root of 8. Implicit steps stay bounded for any stiffness (for the accuracy "
     "of the vibration see numerical-damping).",

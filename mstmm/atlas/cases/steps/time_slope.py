@@ -46,7 +46,7 @@ def _error(rate: float, time_slope: bool) -> float:
 CASE = CaseDefinition(
     name="time-slope",
     title="Rosenbrock steps without the time derivative: a road",
-    why="A linearised step needs the time derivative of the equations, as it needs the tangent "
+    cause="A linearised step needs the time derivative of the equations, as it needs the tangent "
     "matrix for the coordinates. Where drives, roads or loads depend on time and that derivative "
     "is left out, the table is of first order. Runs include it; tables of W-methods, such as "
     "ROS34PW2, do not need it.",

@@ -21,13 +21,13 @@ def _steps_with_usual_norm(stiffness: float) -> float:
 def _steps_of_run(stiffness: float) -> float:
     run = simulate_to_end(sprung_elbow(stiffness), T_END, "rodas4p2", rtol=RTOL, atol=ATOL)
     assert run.statistics is not None
-    return run.statistics.steps + run.statistics.rejected
+    return run.statistics.steps + run.statistics.rejected_steps
 
 
 CASE = CaseDefinition(
     name="usual-norm",
     title="The usual error norm: a stiff spring that is slack at the start",
-    why="A slack spring starts to vibrate with the speed of the load over its frequency, far "
+    cause="A slack spring starts to vibrate with the speed of the load over its frequency, far "
     "above any tolerance, while the displacement of that vibration is far below. In the usual norm "
     "that speed forces every period to be resolved. Weighted by the displacement within the step "
     "the speed is ignored, and the run follows only the slow motion. (A spring so stiff that even "
