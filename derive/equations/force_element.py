@@ -9,7 +9,7 @@ from ..definition.element import ForceElement, Symbols, describe_array
 from ..definition.nonsmooth_functions import slope
 from ..definition.rotation_derivatives import turning_rate
 
-#: Failure code of a force element whose direction is undefined (`defined_when`).
+#: Failure code of a force element whose direction is undefined (`domain`).
 UNDEFINED = 2
 
 

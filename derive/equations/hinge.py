@@ -124,14 +124,16 @@ def moves_as(hinge: Hinge, subspace: sp.Matrix) -> bool:
 
 def _rates(place: HingePlace) -> sp.Matrix:
     hinge, q, u, location = place.hinge, place.q, place.u, f"hinge {place.hinge.name}"
-    rates = stated.optional(location, "rates(q, u, p)", hinge.coordinate_rates, q, u, place.p)
+    rates = stated.optional(
+        location, "coordinate_rates(q, u, p)", hinge.coordinate_rates, q, u, place.p
+    )
     if rates is None and len(q) != len(u):
         raise ElementError(
             f"{location}: {len(q)} coordinates but {len(u)} speeds; "
             "state qdot = N(q) u in rates(q, u, p)"
         )
     given = sp.Matrix(list(u)) if rates is None else rates
-    return stated.matrix(location, "rates(q, u, p)", lambda: given, (len(q), 1))
+    return stated.matrix(location, "coordinate_rates(q, u, p)", lambda: given, (len(q), 1))
 
 
 def _subspace(

@@ -137,7 +137,7 @@ def compile_level(
         model = _model_with_accurate_sweep(build_model, engine)
     else:
         model = build_model(sweep if product is None else "riccati")
-    model.refuse_undetermined_start()
+    model.check_start_determined()
     if engine == "fused":
         model.fusion.build()
     elif engine == "auto":

@@ -28,4 +28,4 @@ def _counted_time(monkeypatch: pytest.MonkeyPatch) -> None:
         each = s.evaluations + s.residuals + 3 * s.tangents + s.solves
         return result, EVALUATION * max(model.nu, 1) * max(each, 1)
 
-    monkeypatch.setattr(Runs, "called", counted)
+    monkeypatch.setattr(Runs, "simulate_with", counted)

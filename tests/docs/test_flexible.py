@@ -47,9 +47,9 @@ def test_the_linear_blade_is_warned_about(page: dict[str, Any]) -> None:
 
 def test_notes_are_those_shown(page: dict[str, Any]) -> None:
     shown = re.findall(r"^```text\n(?=[yz]:)(.*?)\n```", TEXT, re.M | re.S)
-    chosen = page["mstmm"].compile(page["scene"]).flexible["rod"].notes
+    chosen = page["mstmm"].compile(page["scene"]).flexible_bodies["rod"].notes
     assert words("\n".join(chosen)) == words(shown[0])
-    carrying = page["mstmm"].compile(page["carrying"]).flexible["arm"]
+    carrying = page["mstmm"].compile(page["carrying"]).flexible_bodies["arm"]
     assert words(carrying.notes[-1]) == words(shown[1])
 
 

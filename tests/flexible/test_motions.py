@@ -222,7 +222,10 @@ def test_javelin(model: tuple[str, str, int]) -> None:
     result, released = thrown(javelin(*model, stiffening=False))
     assert np.abs(np.array(released) - THROWN[model]).max() < 1e-5
     fallen = np.array([0.0, -9.81, 0.0]) * (result.t[10:, None] - 1.0)
-    velocity, spin = result.equivalent_velocity("javelin"), result.equivalent_spin("javelin")
+    velocity, spin = (
+        result.equivalent_velocity("javelin"),
+        result.equivalent_angular_velocity("javelin"),
+    )
     assert np.abs(velocity[10:] - velocity[10] - fallen).max() < 1e-9
     assert np.abs(spin[10:] - spin[10]).max() < 1e-9
     # The origin of the frame itself does not fall along a parabola but for the mean frame at G.

@@ -13,7 +13,7 @@ from reference.compare import drawn, worst
 import mstmm
 from mstmm.runtime.engine import compiled_linearisation
 
-MATRICES = ("M", "C", "K", "V", "W", "A", "elastic", "damping")
+MATRICES = ("M", "C", "K", "V", "W", "A", "K_elastic", "C_damping")
 ARRAYS = ("udot", "q", "u", "efforts", "t", "rate_q", "rate_u")
 TIME = 0.3
 #: An arm driven at its root, whose elbow is pushed by a signal.

@@ -14,7 +14,7 @@ import mstmm
 from mstmm.runtime.linear.linear_model import Linear
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-PARTS = ("elastic", "geometric", "load")
+PARTS = ("K_elastic", "K_geometric", "K_load")
 
 
 def example(name: str) -> mstmm.Model:

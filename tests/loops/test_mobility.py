@@ -35,14 +35,14 @@ def loops(scene: dict[str, Any]) -> Any:
 def test_published_mobilities(scene: dict[str, Any], rows: int, rank: int, mobility: int) -> None:
     """Four-bars in space move as in the plane, a third crank and Bricard's ring move at all."""
     found = loops(scene)
-    assert (len(found.rows), found.rank, found.mobility) == (rows, rank, mobility)
-    assert len(found.redundant) == rows - rank
+    assert (len(found.constraint_rows), found.rank, found.mobility) == (rows, rank, mobility)
+    assert len(found.redundant_rows) == rows - rank
     assert not found.singular
 
 
 def test_rows_of_windows_pass_few_hinges() -> None:
     """Two rows of a window count, and those of two windows meet at a crank at the most."""
-    assert loops(four_bars(200, 0.7)).width <= 4
+    assert loops(four_bars(200, 0.7)).max_open_rows <= 4
 
 
 @pytest.mark.parametrize("seed", [31, 36, 38, 39, 40])
@@ -52,4 +52,4 @@ def test_random_mechanisms_keep_what_their_rows_leave(seed: int) -> None:
     tree = read(scene)
     found = loops(scene)
     assert found.mobility == tree.nu - np.linalg.matrix_rank(torn(tree, q), tol=1e-8)
-    assert found.rank == len(found.rows) and not found.singular
+    assert found.rank == len(found.constraint_rows) and not found.singular

@@ -184,7 +184,7 @@ def test_linear_models_are_those_of_the_numbers_that_inputs_are() -> None:
     still = acted_on("motor", input=[{"name": "motor", "value": 0.7}])
     moving = acted_on("wind", signal=[{"name": "wind", "times": [0, 1], "values": [0.2, 1.2]}])
     for linear in (still.linearize(), moving.linearize(t=0.5)):
-        for name in ("M", "C", "K", "load", "geometric", "elastic"):
+        for name in ("M", "C", "K", "K_load", "K_geometric", "K_elastic"):
             found, expected = getattr(linear, name), getattr(plain, name)
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
     assert (
@@ -204,7 +204,7 @@ def test_linear_models_are_pushed_by_inputs(t: float) -> None:
 
         def missing(number: float, given: Model = given, state: Any = state) -> Any:
             with_number = given.with_inputs({"motor": number})
-            return with_number.inverse_dynamics(state.q, state.u, state.a, state.t)
+            return with_number.inverse_dynamics(state.q, state.u, state.udot, state.t)
 
         slope = (missing(value - 1e-4) - missing(value + 1e-4)) / 2e-4
         np.testing.assert_allclose(linear.V[:, 0], slope, rtol=1e-8)

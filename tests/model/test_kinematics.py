@@ -174,7 +174,7 @@ CALLS: dict[str, Callable[..., Any]] = {
     "inverse_dynamics": lambda m, q, u, **o: m.inverse_dynamics(q, u, u, **o),
     "mass_matrix": lambda m, q, u, **o: m.mass_matrix(q, **o),
     "solve": lambda m, q, u, **o: m.solve(q, np.eye(m.nu), **o),
-    "bias": lambda m, q, u, **o: m.bias(q, u, **o),
+    "bias": lambda m, q, u, **o: m.bias_efforts(q, u, **o),
     "gravity_efforts": lambda m, q, u, **o: m.gravity_efforts(q, **o),
     "positions": lambda m, q, u, **o: m.positions(q, "b.tip", **o),
     "poses": lambda m, q, u, **o: m.poses(q, ("a", "b.tip"), **o),

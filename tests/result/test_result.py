@@ -248,7 +248,7 @@ def test_quantities_by_name_have_units(run: Result) -> None:
         (lambda r: r.orientation("amr"), 'did you mean "arm"'),
         (lambda r: r.force("elbo"), 'did you mean "elbow"'),
         (lambda r: r.effort("writs"), 'did you mean "wrist"'),
-        (lambda r: r.coordinate("spce"), 'did you mean "space"'),
+        (lambda r: r.coordinates("spce"), 'did you mean "space"'),
         (lambda r: r.quantity("arm.tip.vq"), '"arm.tip.v'),
         (lambda r: r.quantity("enrgy"), 'did you mean "energy"'),
         (lambda r: r.plot("elbow.angel1"), 'did you mean "elbow.angle1"'),

@@ -128,7 +128,7 @@ def test_a_name_of_the_scene_itself_goes_first() -> None:
     ("ask", "message"),
     [
         (lambda run: run.position("tol 0"), 'no such body or end in the scene; did you mean "tool'),
-        (lambda run: run.coordinate("joint/2"), 'such hinge in the scene; did you mean "joint'),
+        (lambda run: run.coordinates("joint/2"), 'such hinge in the scene; did you mean "joint'),
         (lambda run: run.quantity("joint/1.angel"), "no such quantity; did you mean"),
     ],
 )

@@ -28,7 +28,7 @@ def anew(tmp_path_factory: pytest.TempPathFactory) -> Any:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MSTMM_KERNELS", str(tmp_path_factory.mktemp("kernels")))
         for name, hinge in HINGES.items():
-            body = {"name": f"my_{name}", "runs_as": "", "__module__": __name__}
+            body = {"name": f"my_{name}", "equivalent_builtin": "", "__module__": __name__}
             mstmm.register(type(f"My{type(hinge).__name__}", (type(hinge),), body))
         yield
 

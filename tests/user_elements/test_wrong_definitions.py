@@ -75,12 +75,21 @@ def declared(what: str, text: str) -> str:
 
 WRONG: dict[str, tuple[str, str]] = {
     # its place in a scene
-    "frame": (own("frame = 'sideways'"), "frame: expected one of .*found 'sideways'"),
-    "keys": (own("keys = ('axis3',)"), "keys: expected a tuple of axis, axis2, lead, found"),
-    "one axis": (own("frame = 'crossing'"), 'frame "crossing" needs axis2 among the keys'),
-    "no lead": (own("keys = ('axis', 'lead')"), "keys: lead is not a declared parameter"),
+    "frame": (own("frame_rule = 'sideways'"), "frame_rule: expected one of .*found 'sideways'"),
+    "keys": (
+        own("scene_keys = ('axis3',)"),
+        "scene_keys: expected a tuple of axis, axis2, lead, found",
+    ),
+    "one axis": (
+        own("frame_rule = 'crossing'"),
+        'frame_rule "crossing" needs axis2 among the scene_keys',
+    ),
+    "no lead": (
+        own("scene_keys = ('axis', 'lead')"),
+        "scene_keys: lead is not a declared parameter",
+    ),
     "no angle": (
-        own("frame, keys, parameters = 'crossing', ('axis', 'axis2'), ()"),
+        own("frame_rule, scene_keys, parameters = 'crossing', ('axis', 'axis2'), ()"),
         "first parameter is the angle between the axes",
     ),
     # motion
@@ -91,20 +100,20 @@ WRONG: dict[str, tuple[str, str]] = {
     ),
     "mirror": (hinge("sp.diag(1, 1, -1)"), "det R = -1"),
     "subspace": (
-        own("def subspace(self, q, p): return sp.Matrix([0, 0, 0, 0, 0, 2])"),
-        r"subspace\(q, p\) disagrees .* entry \(6, 1\): stated 2, derived 1",
+        own("def motion_subspace(self, q, p): return sp.Matrix([0, 0, 0, 0, 0, 2])"),
+        r"motion_subspace\(q, p\) disagrees .* entry \(6, 1\): stated 2, derived 1",
     ),
     "subspace shape": (
-        own("def subspace(self, q, p): return sp.eye(3)"),
-        r"subspace\(q, p\) is 3 x 3, expected 6 x 1",
+        own("def motion_subspace(self, q, p): return sp.eye(3)"),
+        r"motion_subspace\(q, p\) is 3 x 3, expected 6 x 1",
     ),
     "bias": (
         hinge(
             "rotation_about(2, q.a)",
             "sp.Matrix([p.r * sp.cos(q.a), 0, 0])",
-            "def bias(self, q, u, p): return sp.zeros(6, 1)",
+            "def bias_acceleration(self, q, u, p): return sp.zeros(6, 1)",
         ),
-        r"bias\(q, u, p\) disagrees .* stated 0, derived",
+        r"bias_acceleration\(q, u, p\) disagrees .* stated 0, derived",
     ),
     # expressions
     "undefined function": (along("p.r * sp.Function('g')(q.a)"), "unknown function g"),
@@ -159,17 +168,29 @@ WRONG: dict[str, tuple[str, str]] = {
     "many speeds": (
         own(
             "speeds = tuple(Param(f'w{i}', 'rad/s') for i in range(7))",
-            "def rates(self, q, u, p): return sp.Matrix([u[0]])",
+            "def coordinate_rates(self, q, u, p): return sp.Matrix([u[0]])",
         ),
         "at most six",
     ),
-    "rates shape": (own("def rates(self, q, u, p): return [u[0], u[0]]"), "must be 1 x 1, found 2"),
-    "rates squared": (own("def rates(self, q, u, p): return [u[0]**2]"), "must be linear in u"),
-    "rates offset": (own("def rates(self, q, u, p): return [u[0] + 1]"), "must vanish with u"),
-    "rates unit": (own("def rates(self, q, u, p): return [p.r * u[0]]"), "expected rad/s, found m"),
+    "rates shape": (
+        own("def coordinate_rates(self, q, u, p): return [u[0], u[0]]"),
+        "must be 1 x 1, found 2",
+    ),
+    "rates squared": (
+        own("def coordinate_rates(self, q, u, p): return [u[0]**2]"),
+        "must be linear in u",
+    ),
+    "rates offset": (
+        own("def coordinate_rates(self, q, u, p): return [u[0] + 1]"),
+        "must vanish with u",
+    ),
+    "rates unit": (
+        own("def coordinate_rates(self, q, u, p): return [p.r * u[0]]"),
+        "expected rad/s, found m",
+    ),
     "rates raise": (
-        own("def rates(self, q, u, p): return 1 / 0"),
-        r"rates\(q, u, p\) failed with ZeroDivisionError",
+        own("def coordinate_rates(self, q, u, p): return 1 / 0"),
+        r"coordinate_rates\(q, u, p\) failed with ZeroDivisionError",
     ),
     # declarations
     "built in": (hinge().replace('"mine"', '"pin"'), "hinge 'pin' is built in"),

@@ -58,7 +58,7 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     """
     states = [linear.state, *(() if later is None else later.every)]
     free = list(linear.free_speed_indices)
-    a = np.array([one.a[free] for one in states]).T
+    a = np.array([one.udot[free] for one in states]).T
     if not a.any():
         return None
     sizes = speed_scales(linear.model)[free]

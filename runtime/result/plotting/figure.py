@@ -155,7 +155,7 @@ def plot_of(
             raise SceneError(
                 f'beside: "{other_label}" is the label of another run; give each its own'
             )
-        if not hasattr(other_run, "candidates"):
+        if not hasattr(other_run, "default_quantities"):
             raise SceneError(
                 f'beside: "{other_label}" = {abbreviate(other_run)}: expected a result'
             )
@@ -177,7 +177,7 @@ def _split_names(
     if len(runs) > 1 or wanted.kind != "time" or wanted.against or not hasattr(record, "model"):
         return (), names
     if not names:
-        return (("shape",) if record.model.flexible else ()), ()
+        return (("shape",) if record.model.flexible_bodies else ()), ()
     shape_names = set(names_of_pictures(record))
     return tuple(x for x in names if x in shape_names), tuple(
         x for x in names if x not in shape_names

@@ -243,7 +243,9 @@ def _run_in_lanes(
     start_times = np.full(len(start), settings.t_start)
     start, _ = project_samples(systems[0], start_times, start, np.zeros((len(start), 1)))
     numbers = np.ascontiguousarray([models[i].fusion.numbers for i in rows])
-    channels = [list((models[i].packed.channels | given_inputs.rows[i]).values()) for i in rows]
+    channels = [
+        list((models[i].packed_scene.channels | given_inputs.rows[i]).values()) for i in rows
+    ]
     lane_inputs = LaneInputs(engine, model.fusion.inputs, channels, numbers)
     lanes = Lanes(engine, library, settings, systems, numbers, model.nq + model.nu, lane_inputs)
     samples, outcomes = run_lanes(lanes, start)

@@ -211,8 +211,8 @@ def test_quantities_by_name(run: Result) -> None:
         (lambda r: r.deflection("blade", "tpi"), 'no end "tpi"; it has'),
         (lambda r: r.bending_moment("blade", 0, source="guess"), '"equilibrium" or "shapes"'),
         (lambda r: r.axial_force("blade", 0, source="shapes"), "no axial modes"),
-        (lambda r: r.shape("blade", points=1), "expected 2 or more"),
-        (lambda r: r.momentum_of("blade.tip"), "no such body"),
+        (lambda r: r.deflected_shape("blade", points=1), "expected 2 or more"),
+        (lambda r: r.body_momentum("blade.tip"), "no such body"),
         (lambda r: r.force("blade"), "ask for the hinge that holds it"),
     ],
 )

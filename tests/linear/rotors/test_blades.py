@@ -99,11 +99,11 @@ def test_ground_resonance_has_the_eigenvalues_of_the_closed_form(count: int, spe
 
 def test_growth_over_the_speed_in_the_fixed_frame() -> None:
     speeds = np.linspace(0, 30, 16)
-    locus = helicopter(4).locus("constants.speed", speeds)
+    locus = helicopter(4).root_locus("constants.speed", speeds)
     assert locus.frame == "fixed" and "rotating-frame" not in {x.name for x in locus.risks}
     known = np.array([closed_form(4, speed).real.max() for speed in speeds])
     assert known.max() > 0.1 and known.min() < 0
-    np.testing.assert_allclose(locus.growth.max(axis=1), known, atol=1e-8)
+    np.testing.assert_allclose(locus.growth_rate.max(axis=1), known, atol=1e-8)
 
 
 def test_lag_patterns_whirl_with_the_mass_centre_of_the_blades() -> None:
@@ -158,7 +158,7 @@ def test_a_force_on_the_mount_has_the_response_of_the_closed_form() -> None:
     answer = fixed.frequency_response(omega, ["mount.force.x"], ["x.displacement"])
     forward, backward = (1 / dynamic_stiffness(sign * 1j * omega, 4, 10.0) for sign in (1, -1))
     known = (forward + np.conj(backward)) / 2
-    np.testing.assert_allclose(answer.values[:, 0, 0], known, rtol=1e-8)
+    np.testing.assert_allclose(answer.response[:, 0, 0], known, rtol=1e-8)
     assert answer.trusted
 
 

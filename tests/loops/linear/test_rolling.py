@@ -300,7 +300,7 @@ def test_chaplygins_sleigh(speed: float, heading: float) -> None:
 
 def test_there_are_no_second_order_matrices(tmp_path: Path) -> None:
     linear = coin().linearize(None, [2.0, 0, 0, 0, 4.0, 0], inputs=["fly.effort_wy"])
-    for name in ("M", "C", "K", "V", "W", "damping", "elastic"):
+    for name in ("M", "C", "K", "V", "W", "C_damping", "K_elastic"):
         with pytest.raises(
             SceneError, match="5 positions and 3 speeds here, which have no M, C, K"
         ):
