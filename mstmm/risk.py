@@ -86,18 +86,18 @@ class DeferredRisks:
 
     def __init__(self, find: Callable[[], Iterable[Risk]]) -> None:
         self._find: Callable[[], Iterable[Risk]] | None = find
-        self._found: tuple[Risk, ...] = ()
+        self._risks: tuple[Risk, ...] = ()
 
     def __iter__(self) -> Iterator[Risk]:
         if self._find is not None:
-            self._found, self._find = tuple(self._find()), None
-        return iter(self._found)
+            self._risks, self._find = tuple(self._find()), None
+        return iter(self._risks)
 
     def __reduce__(self) -> tuple[type[tuple[Risk, ...]], tuple[tuple[Risk, ...]]]:
         return tuple, (tuple(self),)
 
 
-class AssessedAnswer(NotebookDisplay):
+class AssessedResult(NotebookDisplay):
     """Base class of answers that report their reliability.
 
     A subclass provides `findings`, the rows of its checks, in any order.

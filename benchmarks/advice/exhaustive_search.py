@@ -22,7 +22,7 @@ from mstmm.runtime.advice.body_model_levels import (
     BodyModel,
 )
 from mstmm.runtime.advice.measure_renaming import Renaming
-from mstmm.runtime.chart.error_measure import Places
+from mstmm.runtime.chart.error_measure import PositionMeasure
 from mstmm.runtime.chart.method_families import PROMISING
 from mstmm.runtime.chart.model_levels import Variant, model_levels, with_tables
 from mstmm.runtime.chart.planar_model import planar_level
@@ -96,7 +96,7 @@ def truth(scene: mstmm.Scene, t_end: float) -> Truth | None:
     """The richest model by two methods that agree best; None where no two reach the end."""
     top = model_levels(scene)[-1]
     model = mstmm.compile(top.scene, engine="looped")
-    measure = Renaming(Places(model, model.simulate(0.0)))
+    measure = Renaming(PositionMeasure(model, model.simulate(0.0)))
     found = _agreed(model, measure, t_end)
     if found is None:
         return None
@@ -109,7 +109,7 @@ def truth_in_parts(known: Truth, wholes: set[str], t_end: float) -> Truth | None
     """The same with beams that one frame cannot follow in sixteen welded parts each."""
     parts = split_beams(_divisible(known.base, wholes), wholes, _PARTS)
     model = mstmm.compile(parts.scene, engine="looped")
-    known.measure.know(model, parts.names)
+    known.measure.register(model, parts.names)
     found = _agreed(model, known.measure, t_end)
     return None if found is None else Truth(found[1], found[0], known.measure, known.base)
 

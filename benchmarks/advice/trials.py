@@ -100,7 +100,7 @@ def outcome(
     found = timed(ours_model, t_end, **advice.options)
     assert found is not None
     measure, truer = known.measure, known
-    measure.know(ours_model, advice.renamed_references)
+    measure.register(ours_model, advice.renamed_references)
     if advice.beam_parts:
         truer = truth_in_parts(known, set(advice.beam_parts.values()), t_end) or known
     error = float(measure.distance(measure.read(found[0]), truer.numbers).max())

@@ -93,7 +93,7 @@ def reference(model: mstmm.Model, t_end: float) -> Reference | None:
     measure = Coordinates(model)
     pairs = []
     for a, q in runs.items():
-        measure.scale_by(q)
+        measure.set_scales(q)
         pairs += [
             (float(measure.distance(q, other).max()), a, b)
             for b, other in runs.items()
@@ -102,7 +102,7 @@ def reference(model: mstmm.Model, t_end: float) -> Reference | None:
     if not pairs:
         return None
     error, a, b = min(pairs)
-    measure.scale_by(runs[a])
+    measure.set_scales(runs[a])
     return Reference(runs[a], error, f"{a[0]} {a[1]:.0e} and {b[0]} {b[1]:.0e}", measure)
 
 

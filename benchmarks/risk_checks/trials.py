@@ -76,6 +76,6 @@ def off(run: Result, exact: Result) -> float:
     if not run.success:
         return math.inf
     measure = Coordinates(exact.model)
-    measure.scale_by(exact.q)
+    measure.set_scales(exact.q)
     _, ours, theirs = np.intersect1d(run.t, exact.t, return_indices=True)
     return float(measure.distance(exact.q[theirs], run.q[ours]).max(initial=0.0))

@@ -73,8 +73,8 @@ def surveyed(
         for engine, one in models.items()
     ]
     survey = Survey(best.run, distance, runs, _quiet)
-    survey.make([one for one in curves if one.method in PROMISING], EARLY)
-    found = survey.make([one for one in curves if one.method not in PROMISING], SETTINGS)
+    survey.run_curves([one for one in curves if one.method in PROMISING], EARLY)
+    found = survey.run_curves([one for one in curves if one.method not in PROMISING], SETTINGS)
     assert best.run.numbers is not None
     return Own(models, reference, best.run.numbers[-1], found.points, found.skipped)
 

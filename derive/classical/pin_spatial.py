@@ -19,9 +19,9 @@ NEXT_EFFORT = sp.MatrixSymbol("tau_n", 1, 1)
 
 def statement() -> HingeStatement:
     """Premises (5.50) to (5.54) and the next pin's condition (5.55)."""
-    rdd_i, wd_i, m_i, q_i = SPATIAL.at("I")
-    rdd_o, wd_o, m_o, q_o = SPATIAL.at("O")
-    about_next = NEXT_AXIS.T * SPATIAL.at("N")[2]
+    rdd_i, wd_i, m_i, q_i = SPATIAL.end_blocks("I")
+    rdd_o, wd_o, m_o, q_o = SPATIAL.end_blocks("O")
+    about_next = NEXT_AXIS.T * SPATIAL.end_blocks("N")[2]
     bias = tilde(OMEGA) * explicit(AXIS) * SPEED[0, 0]
     return HingeStatement(
         element="classical_pin_spatial",

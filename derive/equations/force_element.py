@@ -7,7 +7,7 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from ..definition.element import ForceElement, Symbols, describe_array
 from ..definition.nonsmooth_functions import slope
-from ..definition.rotation_derivatives import turning_rate
+from ..definition.rotation_derivatives import rotating_derivative
 
 #: Failure code of a force element whose direction is undefined (`domain`).
 UNDEFINED = 2
@@ -128,7 +128,7 @@ def _deflection_equations(
     values = dict(zip(names, x, strict=True))
     of_names = deflection.xreplace(dict(zip(x, names, strict=True)))
     derivatives = [slope(of_names, name).xreplace(values) for name in names]
-    turns = [turning_rate(deflection, rotation, units[:, k]) for k in range(3)]
+    turns = [rotating_derivative(deflection, rotation, units[:, k]) for k in range(3)]
     ways, pushed = sp.MatrixSymbol("E", n, 6), vector("push", n)
     steps = [
         Equation("deflection", vector("bent", n), deflection),

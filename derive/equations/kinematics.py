@@ -6,7 +6,7 @@ import sympy as sp
 
 from ..definition.derivation import Derivation, Equation, Quantity, tilde, vector
 from .block_matrices import column, part, stack, symbol
-from .riccati_sweep import FLOOR, MOTION, SHIFT, E, R, floor_of
+from .riccati_sweep import FLOOR, MOTION, SHIFT, E, R, inertia_floor
 
 A_PARENT = Quantity(symbol("A_I", 3, 3), "", "rotation, parent axes to inertial axes")
 X_PARENT = Quantity(symbol("x_I", 3), "m", "P of the parent, inertial axes")
@@ -216,7 +216,7 @@ def pivot_floor() -> Derivation:
         "least inertia that is not rounding",
         (mass_matrix,),
         (FLOOR,),
-        (Equation("share of the mean inertia", FLOOR.symbol, floor_of(mass_matrix.symbol)),),
+        (Equation("share of the mean inertia", FLOOR.symbol, inertia_floor(mass_matrix.symbol)),),
     )
 
 

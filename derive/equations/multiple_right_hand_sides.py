@@ -98,7 +98,7 @@ def _symmetric(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
     )  # fmt: skip
 
 
-def push(nu: int) -> Derivation:
+def column_load(nu: int) -> Derivation:
     """Load of one column carried to the parent."""
     h, _, gain, surplus = _hinge(nu)
     tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
@@ -119,7 +119,7 @@ def push(nu: int) -> Derivation:
     )
 
 
-def push_on_ground(nu: int) -> Derivation:
+def ground_column_load(nu: int) -> Derivation:
     """y of one column at a hinge on the ground."""
     h, _, _, surplus = _hinge(nu)
     tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
@@ -132,7 +132,7 @@ def push_on_ground(nu: int) -> Derivation:
     )  # fmt: skip
 
 
-def answer(nu: int) -> Derivation:
+def column_acceleration(nu: int) -> Derivation:
     """udot = D^-1 y - G X delta_I and the deviation X delta_I + H udot of the body."""
     h, factor, gain, surplus = _hinge(nu)
     rates = Quantity(symbol("udot", nu), "", "accelerations of the free coordinates")

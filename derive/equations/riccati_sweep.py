@@ -306,17 +306,17 @@ def pivot_guards(
 
 def _own_or_composite(body_floor: sp.Expr, composite: sp.Basic, first: int) -> sp.Expr:
     """Limit from the body's own inertia, or from the composite inertia if that is zero."""
-    return sp.Piecewise((body_floor, body_floor > 0), (floor_of(composite)[first // 3], True))
+    return sp.Piecewise((body_floor, body_floor > 0), (inertia_floor(composite)[first // 3], True))
 
 
-def floor_of(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
+def inertia_floor(mass: sp.Basic) -> sp.ImmutableDenseMatrix:
     """Share of the mean mass and mean moment of inertia of a mass matrix (6 x 6)."""
     return sp.ImmutableDenseMatrix(
         [PIVOT_FLOOR * sum(mass[first + k, first + k] for k in range(3)) / 3 for first in (0, 3)]
     )
 
 
-def recover(
+def back_substitute(
     nu: int,
     subspace: sp.MatrixBase | None = None,
     inputs: tuple[Quantity, ...] = (),
@@ -361,7 +361,7 @@ def effort(nu: int) -> Derivation:
     )
 
 
-def exerted(nu: int) -> Derivation:
+def required_load(nu: int) -> Derivation:
     """e = S H udot: load at P that the accelerations of a hinge require."""
     h = Quantity(symbol("H", 6, nu), "", "motion subspace")
     rates = Quantity(symbol("udot", nu), "", "accelerations of the coordinates")

@@ -13,11 +13,11 @@ from ..definition.derivation import Derivation, Equation, Quantity, tilde, vecto
 from .block_matrices import column, part, stack, symbol
 from .riccati_sweep import PARENT_E, SHIFT, E, R, free_speeds, transport
 from .tangent_sweep import (
-    KNOWN,
     KNOWN_LOAD,
+    KNOWN_MOTION,
+    PARENT_RATE,
     ROWS_S,
     SOURCES,
-    TURN_PARENT,
     V_REL,
     W_REL,
     Z_PARENT,
@@ -25,8 +25,8 @@ from .tangent_sweep import (
     outboard_motion,
 )
 
-TURN = Quantity(vector("theta", 3), "", "turn of the body along the direction, body axes")
-PLACE = Quantity(vector("x", 3), "", "change of place of P along the direction, body axes")
+ROTATION = Quantity(vector("theta", 3), "", "turn of the body along the direction, body axes")
+DISPLACEMENT = Quantity(vector("x", 3), "", "change of place of P along the direction, body axes")
 _OF_Q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w, wd, and a of its carrier at P")
 _LOAD = Quantity(vector("f", 6), "N, N*m", "load at P that is carried")
 _COLUMN = (
@@ -45,10 +45,10 @@ def tangent_turned() -> Derivation:
         "frames",
         "turn and change of place along a direction",
         tuple(map(Quantity, (r, d_r, d_d))),
-        (TURN, PLACE),
+        (ROTATION, DISPLACEMENT),
         (
-            Equation("theta~ = R^T dR", TURN.symbol, turn),
-            Equation("R^T dd", PLACE.symbol, r.T * d_d),
+            Equation("theta~ = R^T dR", ROTATION.symbol, turn),
+            Equation("R^T dd", DISPLACEMENT.symbol, r.T * d_d),
         ),
         sources=SOURCES,
     )
@@ -61,10 +61,10 @@ def tangent_along(nu: int) -> Derivation:
         f"generic{nu}",
         f"turn and change of place along coordinates of a hinge with {free_speeds(nu)}",
         (Quantity(h), Quantity(d_q)),
-        (TURN, PLACE),
+        (ROTATION, DISPLACEMENT),
         (
-            Equation("theta = H_w dq", TURN.symbol, h[3:, :] * d_q),
-            Equation("R^T dd = H_v dq", PLACE.symbol, h[:3, :] * d_q),
+            Equation("theta = H_w dq", ROTATION.symbol, h[3:, :] * d_q),
+            Equation("R^T dd = H_v dq", DISPLACEMENT.symbol, h[:3, :] * d_q),
         ),
         sources=SOURCES,
     )
@@ -103,7 +103,7 @@ def tangent_carrier(nu: int) -> Derivation:
     )
 
 
-_NOTHING = sp.ImmutableDenseMatrix(sp.zeros(3, 1))
+_ZERO_COLUMN = sp.ImmutableDenseMatrix(sp.zeros(3, 1))
 
 
 def _direction_equations(
@@ -115,8 +115,8 @@ def _direction_equations(
     displacement: sp.MatrixBase | None = None,
 ) -> tuple[Equation, ...]:
     """B and G from the changes across the hinge."""
-    turn = tilde(column(TURN.symbol))
-    displacement = column(PLACE.symbol) if displacement is None else displacement
+    turn = tilde(column(ROTATION.symbol))
+    displacement = column(DISPLACEMENT.symbol) if displacement is None else displacement
     turning, rate, acceleration = (part(_OF_Q.symbol, 3 * k) for k in range(3))
     d_turning = symbol("dw_Q", 3)
     relative, spin = tilde(column(w)), tilde(turning)
@@ -187,7 +187,7 @@ def tangent_column(nu: int) -> Derivation:
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {nu} speeds",
-        (TURN, PLACE, *map(Quantity, (h, s, v, w)), _OF_Q, _LOAD,
+        (ROTATION, DISPLACEMENT, *map(Quantity, (h, s, v, w)), _OF_Q, _LOAD,
          *map(Quantity, (d_h, d_v, d_w, d_c, d_s)), *row_inputs),
         (*_COLUMN, row),
         (*equations, rows) if nu else equations,
@@ -206,7 +206,7 @@ def tangent_steady(nu: int) -> Derivation:
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {free_speeds(nu)}, whose subspace is constant",
-        (TURN, PLACE, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
+        (ROTATION, DISPLACEMENT, *map(Quantity, (h, v, w)), _OF_Q, _LOAD,
          *map(Quantity, (d_u, d_s)), *row_inputs),
         (*_COLUMN, row),
         (
@@ -234,13 +234,18 @@ def tangent_turning(nu: int) -> Derivation:
     return Derivation(
         f"generic{nu}",
         f"a direction of a hinge with {free_speeds(nu)}, which turns about constant axes",
-        (TURN, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *row_inputs),
+        (ROTATION, *map(Quantity, (h, w)), _OF_Q, _LOAD, *map(Quantity, (d_u, d_s)), *row_inputs),
         (*_COLUMN, row),
         (
             Equation("slope of w", d_w, h[3:, :] * d_u),
             Equation("H_w ds", own_acceleration, h[3:, :] * d_s),
             *_direction_equations(
-                _NOTHING, w, _NOTHING, column(d_w), (_NOTHING, column(own_acceleration)), _NOTHING
+                _ZERO_COLUMN,
+                w,
+                _ZERO_COLUMN,
+                column(d_w),
+                (_ZERO_COLUMN, column(own_acceleration)),
+                _ZERO_COLUMN,
             ),
             rows,
         ),
@@ -362,11 +367,22 @@ def tangent_answer(nu: int, known: bool = False) -> Derivation:
         f"generic{nu}",
         f"unknowns of a hinge with {free_speeds(nu)} that answer a right-hand side"
         + (" and increments that are known" if known else ""),
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT, b, gain, y, *((KNOWN,) if known else ())),
+        (
+            R,
+            SHIFT,
+            PARENT_RATE,
+            V_REL,
+            W_REL,
+            Z_PARENT,
+            b,
+            gain,
+            y,
+            *((KNOWN_MOTION,) if known else ()),
+        ),
         (unknowns, Z),
         (
             first,
-            Equation("Th z_I", motion, carried + KNOWN.symbol if known else carried),
+            Equation("Th z_I", motion, carried + KNOWN_MOTION.symbol if known else carried),
             Equation("x", unknowns.symbol, y.symbol - gain.symbol * motion),
             Equation("z", Z.symbol, motion + b.symbol.T * unknowns.symbol),
         ),

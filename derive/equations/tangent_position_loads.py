@@ -29,8 +29,8 @@ import sympy as sp
 from ..definition.derivation import Derivation, Equation, Quantity, Solve, tilde, vector
 from .block_matrices import column, part, stack, symbol
 from .riccati_sweep import SHIFT, R
-from .tangent_hinge_elimination import PLACE, TURN
-from .tangent_sweep import ANSWER, OWN_D, OWN_K, SOURCES, V_REL, Z_PARENT, D, H, N, V
+from .tangent_hinge_elimination import DISPLACEMENT, ROTATION
+from .tangent_sweep import OWN_D, OWN_K, SOLUTION, SOURCES, V_REL, Z_PARENT, D, H, N, V
 
 P = Quantity(vector("p", 9), "", "change of place: turn, place and velocity of P, own axes")
 _P_PARENT = Quantity(vector("p_I", 9), "", "change of the parent's place, parent axes")
@@ -89,7 +89,7 @@ def placed_column() -> Derivation:
     velocity = Quantity(vector("v_P", 3), "m/s", "velocity of P, own axes")
     d_v = Quantity(vector("d_v", 3), "m/s", "change of the relative velocity")
     of_q = Quantity(vector("Q", 9), "", "motion of Q in body axes: w first")
-    turn, position = column(TURN.symbol), column(PLACE.symbol)
+    turn, position = column(ROTATION.symbol), column(DISPLACEMENT.symbol)
     carried = sp.ImmutableDenseMatrix(column(velocity.symbol) - column(V_REL.symbol))
     velocity_change = (
         column(d_v.symbol) - tilde(turn) * carried + tilde(part(of_q.symbol, 0)) * position
@@ -97,7 +97,7 @@ def placed_column() -> Derivation:
     return Derivation(
         "frames",
         "change of place along a direction",
-        (TURN, PLACE, velocity, V_REL, d_v, of_q),
+        (ROTATION, DISPLACEMENT, velocity, V_REL, d_v, of_q),
         (Quantity(symbol("B_p", 9), "", "change of place along the direction"),),
         (Equation("B_p", symbol("B_p", 9), stack(turn, position, velocity_change)),),
         sources=SOURCES,
@@ -266,7 +266,7 @@ def placed_absorb() -> Derivation:
 
 def placed_left() -> Derivation:
     """y less the contribution of the displacement to the rows."""
-    result = Quantity(ANSWER.symbol, "", "what is left of the rows", accumulate=True)
+    result = Quantity(SOLUTION.symbol, "", "what is left of the rows", accumulate=True)
     return Derivation(
         "tangent",
         "rows less what the change of place makes of them",

@@ -45,7 +45,7 @@ SOURCES = (
     "Featherstone, Rigid Body Dynamics Algorithms, ch. 7 (articulated-body elimination)",
 )
 
-TURN_PARENT = Quantity(vector("w_I", 3), "rad/s", "angular velocity of the parent, parent axes")
+PARENT_RATE = Quantity(vector("w_I", 3), "rad/s", "angular velocity of the parent, parent axes")
 V_REL = Quantity(vector("v", 3), "m/s", "relative velocity of the hinge, body axes")
 W_REL = Quantity(vector("w", 3), "rad/s", "relative angular velocity of the hinge, body axes")
 Z_PARENT = Quantity(vector("z_I", 9), "", "change of the parent's motion, parent axes")
@@ -55,7 +55,7 @@ ROWS_S = Quantity(symbol("S", 9, 6), "", "change of the load by that of the moti
 
 def _spin_acceleration() -> sp.ImmutableDenseMatrix:
     """Acceleration of P by the parent's change of angular velocity: (w x r)~ + w~ r~."""
-    w, r = column(TURN_PARENT.symbol), column(SHIFT.symbol)
+    w, r = column(PARENT_RATE.symbol), column(SHIFT.symbol)
     return sp.ImmutableDenseMatrix(tilde(tilde(w) * r) + tilde(w) * tilde(r))
 
 
@@ -73,7 +73,7 @@ def tangent_carry() -> Derivation:
     return Derivation(
         "frames",
         "change of a load carried to the parent",
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, ROWS_S),
+        (R, SHIFT, PARENT_RATE, V_REL, W_REL, ROWS_S),
         (s_th, parent),
         (
             Equation("relative velocity, parent axes", velocity, R.symbol * V_REL.symbol),
@@ -118,7 +118,7 @@ def tangent_moved() -> Derivation:
     return Derivation(
         "frames",
         "change of a body's motion by that of its parent's",
-        (R, SHIFT, TURN_PARENT, V_REL, W_REL, Z_PARENT),
+        (R, SHIFT, PARENT_RATE, V_REL, W_REL, Z_PARENT),
         (Z,),
         (first, Equation("Th z_I", Z.symbol, motion)),
         sources=SOURCES,
@@ -127,9 +127,9 @@ def tangent_moved() -> Derivation:
 
 # --- increments that are known ------------------------------------------------------------------
 
-KNOWN = Quantity(symbol("b", 9), "", "change of motion that is known")
+KNOWN_MOTION = Quantity(symbol("b", 9), "", "change of motion that is known")
 KNOWN_LOAD = Quantity(symbol("e_b", 6), "N, N*m", "load by what is known, without the unknowns")
-_TURNED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by what is known")
+_ROTATED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by what is known")
 
 
 def tangent_known() -> Derivation:
@@ -142,11 +142,11 @@ def tangent_known() -> Derivation:
     return Derivation(
         "frames",
         "load by a motion that is known",
-        (ROWS_S, KNOWN, _TURNED_LOAD),
+        (ROWS_S, KNOWN_MOTION, _ROTATED_LOAD),
         (load_rows, KNOWN_LOAD),
         (
-            Equation("S b", load_rows.symbol, ROWS_S.symbol.T * KNOWN.symbol),
-            Equation("S b + g", KNOWN_LOAD.symbol, load_rows.symbol + _TURNED_LOAD.symbol),
+            Equation("S b", load_rows.symbol, ROWS_S.symbol.T * KNOWN_MOTION.symbol),
+            Equation("S b + g", KNOWN_LOAD.symbol, load_rows.symbol + _ROTATED_LOAD.symbol),
         ),
         sources=SOURCES,
     )
@@ -171,7 +171,7 @@ W = _square("W", "slopes of the rows, a row a direction")
 D = _square("D", "rows by unknowns")
 V = Quantity(sp.MatrixSymbol("V", 6, N), "", "K + G")
 GAIN = _rows("gain", 9, "D^-1 times the rows by the motion")
-ANSWER = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times what is left of the rows")
+SOLUTION = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times what is left of the rows")
 RIGHT = _rows("right", 9, "rows by the motion")
 OWN_K = _rows("K", 6, "own load along the unknowns")
 OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, a row an entry")
@@ -257,11 +257,11 @@ def push() -> Derivation:
         "tangent",
         "unknowns eliminated from a right-hand side",
         (H, V, D, E, load_rows),
-        (right_side, ANSWER, load),
+        (right_side, SOLUTION, load),
         (
             Equation("-e_f - H^T e", right_side.symbol, -load_rows.symbol - H.symbol.T * E.symbol),
-            Equation("D^-1 (-e_f - H^T e)", ANSWER.symbol, Solve(D.symbol, right_side.symbol)),
-            Equation("e + V y", load.symbol, E.symbol + V.symbol * ANSWER.symbol),
+            Equation("D^-1 (-e_f - H^T e)", SOLUTION.symbol, Solve(D.symbol, right_side.symbol)),
+            Equation("e + V y", load.symbol, E.symbol + V.symbol * SOLUTION.symbol),
         ),
         sources=SOURCES,
     )
@@ -282,7 +282,7 @@ def lagged() -> Derivation:
 
 
 UNKNOWNS = Quantity(sp.MatrixSymbol("x", N, 1), "", "unknowns")
-BEHIND = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' part")
+BASE_MOTION = Quantity(vector("z_c", 9), "", "change of motion without the unknowns' part")
 
 
 def answer() -> Derivation:
@@ -290,11 +290,11 @@ def answer() -> Derivation:
     return Derivation(
         "tangent",
         "unknowns that answer a right-hand side",
-        (B, GAIN, ANSWER, BEHIND),
+        (B, GAIN, SOLUTION, BASE_MOTION),
         (UNKNOWNS, Z),
         (
-            Equation("x", UNKNOWNS.symbol, ANSWER.symbol - GAIN.symbol * BEHIND.symbol),
-            Equation("z + B x", Z.symbol, BEHIND.symbol + B.symbol.T * UNKNOWNS.symbol),
+            Equation("x", UNKNOWNS.symbol, SOLUTION.symbol - GAIN.symbol * BASE_MOTION.symbol),
+            Equation("z + B x", Z.symbol, BASE_MOTION.symbol + B.symbol.T * UNKNOWNS.symbol),
         ),
         sources=SOURCES,
     )
@@ -305,9 +305,9 @@ def displaced() -> Derivation:
     return Derivation(
         "tangent",
         "change of motion with the unknowns' part",
-        (B, UNKNOWNS, BEHIND),
+        (B, UNKNOWNS, BASE_MOTION),
         (Z,),
-        (Equation("z + B x", Z.symbol, BEHIND.symbol + B.symbol.T * UNKNOWNS.symbol),),
+        (Equation("z + B x", Z.symbol, BASE_MOTION.symbol + B.symbol.T * UNKNOWNS.symbol),),
         sources=SOURCES,
     )
 

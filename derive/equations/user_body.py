@@ -42,7 +42,9 @@ def _frame(body: Body, array: sp.MatrixSymbol) -> tuple[sp.Matrix, sp.Matrix, sp
     return turn, lever, x
 
 
-def _evaluated(matrix: sp.Matrix, p: Symbols, array: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
+def _substitute_parameters(
+    matrix: sp.Matrix, p: Symbols, array: sp.MatrixSymbol
+) -> sp.ImmutableDenseMatrix:
     replace = {s: array[i, 0] for i, s in enumerate(p)}
     return sp.ImmutableDenseMatrix(sp.Matrix(matrix).xreplace(replace))
 
@@ -79,7 +81,7 @@ def inertia(body: Body) -> Derivation:
         f"mass matrix of the {body.title}",
         (parameters,),
         (S,),
-        _mass_equations(body, array, _evaluated(mass, p, array)),
+        _mass_equations(body, array, _substitute_parameters(mass, p, array)),
         sources=body.sources,
     )
 
@@ -95,7 +97,7 @@ def bias_load(body: Body) -> Derivation:
         f"load that the bias motion of the {body.title} needs",
         (parameters, MOTION),
         (E,),
-        (*carried, *_load_equations(body, array, _evaluated(residual, p, array))),
+        (*carried, *_load_equations(body, array, _substitute_parameters(residual, p, array))),
         sources=body.sources,
     )
 
@@ -113,7 +115,7 @@ def kinetic_energy(body: Body) -> Derivation:
         f"kinetic energy of the {body.title}",
         (parameters, Quantity(v, "m/s", "velocity of P"), Quantity(w, "rad/s", "angular velocity")),
         (Quantity(energy, "J", "kinetic energy"),),
-        (*carried, Equation("kinetic energy", energy, _evaluated(value, p, array))),
+        (*carried, Equation("kinetic energy", energy, _substitute_parameters(value, p, array))),
         sources=body.sources,
     )
 

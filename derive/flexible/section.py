@@ -254,7 +254,7 @@ def inward() -> Derivation:
     )
 
 
-def turn_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
+def rotation_guards() -> tuple[tuple[sp.Basic, int, str], ...]:
     """Guards of the section rotation: range of the series and of the model."""
     text = f"a section turns by more than {MAX_SECTION_ROTATION} rad against its floating frame"
     return ((SQUARE[0, 0] < MAX_SECTION_ROTATION**2, 1, text),)
@@ -273,7 +273,7 @@ def subspace() -> Derivation:
     )
 
 
-def imposed() -> Derivation:
+def prescribed_bias() -> Derivation:
     """Bias of a port with prescribed modal accelerations s: c + H s."""
     h = modal_columns("H", 6, "motion subspace of the modes")
     s = modal_vector("s", "prescribed modal accelerations")

@@ -61,7 +61,7 @@ def fuse(
     replay = ScheduleInterpreter(state)
     replay.sweep(ACCELERATIONS)
     for _ in range(s.refines):  # same pivots as in the first solution: their nodes are shared
-        state.given = replay.collect("udot")
+        state.given_accelerations = replay.collect("udot")
         replay = ScheduleInterpreter(state, refined=True)
         replay.sweep(ACCELERATIONS)
     outputs = [Port("qdot", (s.nq,)), Port("udot", (s.nu,))]

@@ -29,7 +29,7 @@ def lower(
     for condition, code, message in guards:
         lowering.graph.guard(lowering.scalar(condition), code, message)
     values: dict[str, object] = {
-        q.name: lowering.stored(q) for q in derivation.outputs if not q.sized
+        q.name: lowering.stored_entries(q) for q in derivation.outputs if not q.has_runtime_size
     }
     return lowering.graph.kernel(
         name,

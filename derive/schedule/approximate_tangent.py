@@ -23,8 +23,8 @@ from .pass_steps import (
     SelectColumns,
     Sweep,
     call,
-    elsewhere,
     only,
+    with_renamed_slots,
 )
 from .tangent_sweep import HINGE_CHANGE, KNOWN_LAWS, LAW_CHANGE
 
@@ -87,7 +87,7 @@ LAWS_OWN_SLOPES = Pass(
     ),
 )
 
-_factorise = elsewhere(FACTORISE, _NAME, _SLOTS)
+_factorise = with_renamed_slots(FACTORISE, _NAME, _SLOTS)
 LAWS_FACTORISE = Pass(
     _factorise.name, "body", "Mass matrices with laws carried to the root.",
     (
@@ -124,11 +124,11 @@ LAWS_SOLUTION = Sweep(
     "laws_solution",
     "One right-hand side through the mass matrix with laws.",
     (
-        Run(whole=elsewhere(COLUMN, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN, _NAME, _SLOTS)),
         Run(whole=KNOWN_LAWS, when="shifted laws"),
         Run(whole=MODES_CHANGE, when="shifted flexible"),
-        Run(whole=elsewhere(COLUMN_CARRIED, _NAME, _SLOTS)),
-        Run(whole=elsewhere(COLUMN_ANSWERED, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN_CARRIED, _NAME, _SLOTS)),
+        Run(whole=with_renamed_slots(COLUMN_ANSWERED, _NAME, _SLOTS)),
     ),
 )
 

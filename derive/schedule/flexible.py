@@ -68,20 +68,20 @@ MODAL_CONDENSE = Pass(
 )  # fmt: skip
 
 #: Contribution of the bodies outboard of an end to the modes of the flexible body.
-ABSORBED = call(
+PORT_ASSEMBLY = call(
     "modal.absorb", Rc="hinge.R", r="hinge.d", H="section.H", S="body.S", e="body.e",
     U="section.push", S_rf="modes.S_rf", S_ff="modes.S_ff", e_f="modes.e_f",
 )  # fmt: skip
 
 #: Contribution of the modes to the deviation outboard of a section.
-DISPLACED = (
+PORT_MOTION = (
     call("modal.displaced", H="section.H", etadd="modes.etadd", delta_I="body.delta",
          delta="local.delta"),
     Copy(to="body.delta", source="local.delta"),
 )  # fmt: skip
 
 #: Modal efforts of the load on a section.
-FELT = (
+MODAL_EFFORT = (
     call("modal.modal_effort", H="section.H", e="body.e", e_f="modes.e_f", tau="modes.felt"),
     Copy(to="modes.e_f", source="modes.felt"),
 )

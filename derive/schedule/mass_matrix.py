@@ -8,7 +8,7 @@ to the root resist.
 from __future__ import annotations
 
 from .forward_kinematics import FORWARD, HINGE_MOTION, PRESCRIBED
-from .inverse_dynamics import FELT_ON_THE_WAY
+from .inverse_dynamics import EFFORT_AND_TRANSPORT
 from .pass_steps import TIPS_TO_ROOT, Copy, Pass, Run, RunPass, Sweep, call
 from .riccati_sweep import BODY
 
@@ -34,7 +34,7 @@ FELT_BY = Pass(
     "felt_by",
     "body",
     "What one hinge feels of a load, and the load on the parent.",
-    FELT_ON_THE_WAY,
+    EFFORT_AND_TRANSPORT,
 )
 
 COMPOSITION = Sweep(

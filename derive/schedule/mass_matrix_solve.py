@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .flexible import ABSORBED, DISPLACED, FELT, MODAL_CONDENSE
+from .flexible import MODAL_CONDENSE, MODAL_EFFORT, PORT_ASSEMBLY, PORT_MOTION
 from .forward_kinematics import HINGE_MOTION
 from .pass_steps import TIPS_TO_ROOT, Add, Copy, Pass, RunPass, ScatterSpeeds, call, only
 from .riccati_sweep import BODY, FREE, FREE_EFFORTS
@@ -13,7 +13,7 @@ FACTORISE = Pass(
         RunPass(whole=HINGE_MOTION, when="own"),
         # Loads are carried but not read: each column starts from zero load.
         RunPass(whole=MODAL_CONDENSE, when="modal"),
-        *only("outward", ABSORBED),
+        *only("outward", PORT_ASSEMBLY),
         *FREE,
         call("generic{free}.factor", fails="undetermined", **BODY, H="hinge.H_free",
              J="hinge.J_free", W="zero", floor="body.floor", S="body.S", F="hinge.F",
@@ -35,11 +35,11 @@ COLUMN = Pass(
 COLUMN_CARRIED = Pass(
     "column_carried", "body", "The column's load carried across the hinge to the parent.",
     (
-        *only("modal section", *FELT),
+        *only("modal section", *MODAL_EFFORT),
         *only("modal", call("modal.pushed", Gg="modes.gain", e="body.e", e_f="modes.e_f",
                             e_c="local.e_c"),
               Copy(to="body.e", source="local.e_c")),
-        *only("outward", *FELT),
+        *only("outward", *MODAL_EFFORT),
         FREE_EFFORTS,
         call("generic{free}.push", **BODY, H="hinge.H_free", G="hinge.G", e="body.e",
              tau="hinge.tau_free", y="hinge.g", e_I="parent.e"),
@@ -57,7 +57,7 @@ COLUMN_ANSWERED = Pass(
                             delta_I="body.delta", y="modes.felt", etadd="modes.etadd",
                             work="modes.work"),
               Copy(to="modes.answer", source="modes.etadd")),
-        *only("section", *DISPLACED),
+        *only("section", *PORT_MOTION),
     ),
     skip="idle",
 )  # fmt: skip

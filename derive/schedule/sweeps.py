@@ -25,7 +25,7 @@ from .loop_closure import (
 from .mass_matrix import COMPOSITION, EXERTED, FELT_BY
 from .mass_matrix_solve import COLUMN, COLUMN_ANSWERED, COLUMN_CARRIED, FACTORISE
 from .pass_steps import Pass, Run, Sweep
-from .planar_passes import sweep_in_plane
+from .planar_passes import planar_sweep
 from .qr_sweep import QR_CONDENSE, QR_OWN
 from .riccati_sweep import CONDENSE, RECOVER
 from .tangent_sweep import (
@@ -96,7 +96,7 @@ ACCELERATIONS = Sweep(
 )  # fmt: skip
 
 #: For planar scenes with closed loops, without observation.
-ACCELERATIONS_IN_PLANE = sweep_in_plane(ACCELERATIONS)
+ACCELERATIONS_IN_PLANE = planar_sweep(ACCELERATIONS)
 
 INVERSE_DYNAMICS = Sweep(
     "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",

@@ -166,7 +166,7 @@ _REQUIRED_KEYS = {"crossing": ("axis", "axis2"), "plane": ("axis", "axis2")}
 
 
 def _check_frame(where: str, hinge: Hinge) -> None:
-    """Check `frame` and `keys`, which define how a scene places the hinge."""
+    """Check `frame` and `scene_keys`, which define how a scene places the hinge."""
     if hinge.frame_rule not in FRAMES:
         frame_names = ", ".join(f'"{frame}"' for frame in FRAMES)
         raise ElementError(

@@ -18,9 +18,9 @@ from ..runtime.model.model import Model
 from ..runtime.result.result import Result
 from .shared_scenes import (
     RELEASE_ANGLE,
+    rod_with_spring,
     solid_bar,
     spinning_top,
-    sprung_rod,
     stiffness_for_frequency,
 )
 
@@ -90,7 +90,7 @@ def relative_amplitudes(rate: float, steps: int, method: str, **options: Any) ->
     """
     frequency = rate / STEP
     times = np.arange(steps + 1) * STEP
-    rod = sprung_rod(stiffness_for_frequency(frequency))
+    rod = rod_with_spring(stiffness_for_frequency(frequency))
     run = simulate_to_end(
         rod, times[-1], method, STEP, rtol=1e-10, atol=1e-14, output_times=times, **options
     )

@@ -104,7 +104,7 @@ def _check_function(what: str) -> Callable[[str], Report]:
 def _check_scene(path: str) -> Report:
     """Validate, compile, and evaluate the accelerations once."""
     import mstmm
-    from mstmm.runtime.packing.merging.simplification import COUNTED
+    from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
     from mstmm.runtime.run.step_stability import find_fastest_motion
 
     from .model_loading import compile_file
@@ -120,7 +120,7 @@ def _check_scene(path: str) -> Report:
     notes = [
         f"{name}: {note}" for name, body in model.flexible_bodies.items() for note in body.notes
     ]
-    notes += [str(one) for one in model.simplifications if one.kind in COUNTED]
+    notes += [str(one) for one in model.simplifications if one.kind in COUNT_TEXTS]
     warnings = [
         *scene.warnings,
         *(w for body in model.flexible_bodies.values() for w in body.warnings),
@@ -202,7 +202,7 @@ def _tree_lines(scene: Scene) -> list[str]:
         if len(lines) > _MAX_SHOWN:
             break
         first = 1 + _tree_depth(tree, depth, run.parent)
-        depth[run.place] = first
+        depth[run.position] = first
         hinge, body = skeleton.hinges[run.hinge], skeleton.bodies[run.body]
         description = f"{body.name}  ({hinge.name}: {hinge.type})"
         if run.count > 1:

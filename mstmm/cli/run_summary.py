@@ -22,8 +22,8 @@ def size_text(result: Result) -> str:
     model, bodies = result.model, len(result.model.scene.skeleton.bodies)
     free_count, driven_count = len(model.free_speed_indices), len(model.packed_scene.system.driven)
     locked_count = model.nu - free_count - driven_count
-    if model.closed is not None:  # loops reduce the mobility of all speeds together
-        free_count, locked_count = model.closed.loops.mobility, 0
+    if model.loop_start is not None:  # loops reduce the mobility of all speeds together
+        free_count, locked_count = model.loop_start.loops.mobility, 0
     parts = [
         f"{count_text(bodies, 'body', 'bodies')} on {count_text(len(model.scene.hinges), 'hinge')}",
         f"{count_text(free_count, 'degree')} of freedom",
@@ -35,12 +35,12 @@ def size_text(result: Result) -> str:
 
 def simplification_counts(result: Result) -> str:
     """Numbers of simplifications of the scene; empty if there are none."""
-    from mstmm.runtime.packing.merging.simplification import COUNTED
+    from mstmm.runtime.packing.merging.simplification import COUNT_TEXTS
 
     kinds = [singular.kind for singular in result.model.simplifications]
     return "; ".join(
         f"{count_text(kinds.count(kind), singular, plural)} {description}"
-        for kind, (singular, plural, description) in COUNTED.items() if kind in kinds
+        for kind, (singular, plural, description) in COUNT_TEXTS.items() if kind in kinds
     )  # fmt: skip
 
 

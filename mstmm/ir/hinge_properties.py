@@ -119,7 +119,7 @@ class HingeProperties:
         frame_parameter_count = 1 if self.frame == "crossing" else 0
         return tuple(p for p in self.parameters[frame_parameter_count:] if p.name not in self.keys)
 
-    def at_start(self, p: Sequence[float] = ()) -> list[tuple[Vector, Vector]]:
+    def start_motion_columns(self, p: Sequence[float] = ()) -> list[tuple[Vector, Vector]]:
         """(translation, rotation) per unit of each speed at the start values.
 
         `p` holds the parameters of the kernel.  ValueError if H depends on them and their number
@@ -211,16 +211,16 @@ class _Dependence:
     """Dependence of the values of a kernel on parameters and coordinates."""
 
     def __init__(self, kernel: KernelIR) -> None:
-        self._of: dict[int, str] = {}
+        self._letters: dict[int, str] = {}
         for statement in kernel.statements:
             if isinstance(statement, Assign):
                 letters = {self._reads(argument) for argument in statement.args}
-                self._of[statement.number] = max(letters, default="")
+                self._letters[statement.number] = max(letters, default="")
 
     def _reads(self, operand: Operand) -> str:
         """Dependence: "" none, "p" on parameters only, "q" on coordinates or speeds too."""
         if isinstance(operand, Temporary):
-            return self._of[operand.number]
+            return self._letters[operand.number]
         if isinstance(operand, Element):
             return "p" if operand.port == "p" else "q"
         return ""

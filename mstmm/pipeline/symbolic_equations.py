@@ -112,8 +112,8 @@ class _EquationBuilder:
         self.model, self.book = model, SymbolTable(MAX_PRODUCTS)
         names = scene_parameters.resolve_names(model.scene, keep)
         values = model.parameters
-        self.kept = {name: self.book.symbol(name, values[name]) for name in names}
-        seeds = list(self.kept.values())
+        self.kept_symbols = {name: self.book.symbol(name, values[name]) for name in names}
+        seeds = list(self.kept_symbols.values())
         known_elements = model.known or {}
         system, _ = seed_derivatives(model.scene, known_elements, names, lambda _, k: seeds[k])
         self.structure, self.p = structure_and_numbers(system, known_elements)
@@ -150,7 +150,7 @@ class _EquationBuilder:
                 yield full_name, symbol
 
     def equations(self) -> SymbolicEquations:
-        required = self._required()
+        required = self._required_efforts()
         free = self.model.free_speed_indices
         free_accelerations = [self.a[j] for j in free]
         mass = [[factor_of_symbol(required[i], a) for a in free_accelerations] for i in free]
@@ -162,7 +162,12 @@ class _EquationBuilder:
         inputs = {
             name: to_sympy(x) for name, x in self.inputs.items() if to_sympy(x) in used_symbols
         }
-        symbols = (*self.q, *self.u, *self.kept.values(), *(self.inputs[name] for name in inputs))
+        symbols = (
+            *self.q,
+            *self.u,
+            *self.kept_symbols.values(),
+            *(self.inputs[name] for name in inputs),
+        )
         numbers = {to_sympy(x): x.value for x in symbols}
         layout = self.model.coordinate_layout
         q = zip(self.q, layout.q_names, (x for o in layout.owners for x in o.q_units), strict=True)
@@ -173,10 +178,10 @@ class _EquationBuilder:
             tuple(Motion(to_sympy(x), name, unit) for x, name, unit in u),
             free, tuple(to_sympy(x) for k, x in enumerate(self.a) if k not in free),
             inputs,
-            {name: to_sympy(x) for name, x in self.kept.items()}, numbers,
+            {name: to_sympy(x) for name, x in self.kept_symbols.items()}, numbers,
         )  # fmt: skip
 
-    def _required(self) -> list[Formula]:
+    def _required_efforts(self) -> list[Formula]:
         _, definitions = kernel_store.load_known(kernel_store.required_types(self.model.scene))
         user_specs = {
             key: element.spec for key, element in (self.model.known or {}).items() if element.spec

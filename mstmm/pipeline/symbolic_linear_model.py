@@ -60,12 +60,12 @@ def symbolic_linear_model(
     equations = _FormulaEquations(linear, names, kernels)
     writer = SympyWriter()
     symbols = {name: writer.symbol(equations.symbols[name]) for name in keep}
-    m, c, k = map(writer.matrix, equations.counted(equations.second_order()))
+    m, c, k = map(writer.matrix, equations.count_terms(equations.second_order()))
     input_matrices = [
-        equations.pushed(channels)
+        equations.input_matrix(channels)
         for channels in (linear.input_channels, linear.disturbance_channels)
     ]
-    v, w = map(writer.matrix, equations.counted(input_matrices))
+    v, w = map(writer.matrix, equations.count_terms(input_matrices))
     numbers = {
         symbols[name]: kept_formula.value for name, kept_formula in equations.symbols.items()
     }
@@ -110,7 +110,7 @@ class _FormulaEquations:
         self._linear, self._kernels, self._book = linear, kernels, SymbolTable(MAX_PRODUCTS)
         self.symbols: dict[str, Formula] = {}
         model, state = linear.model, linear.state
-        self._known = model.known or {}
+        self._user_elements = model.known or {}
         #: Contribution of a unit of each disturbance input to R, filled in by `second_order`.
         self._inputs: dict[int, list[Formula]] = {
             channel.input: []
@@ -120,10 +120,10 @@ class _FormulaEquations:
         values = model.parameters
         seeds = [self._symbol(name, values[full]) for full, name in names.parameters.items()]
         self._system, self._frames = seed_derivatives(
-            model.scene, self._known, list(names.parameters), lambda _, k: seeds[k]
+            model.scene, self._user_elements, list(names.parameters), lambda _, k: seeds[k]
         )
         if dry := linear.dry:
-            self._system = replace(self._system, laws=dry.replaced(self._system.laws))
+            self._system = replace(self._system, laws=dry.replace_friction(self._system.laws))
         self._q = [_rounded_formula(x) for x in state.q.tolist()]
         self._u = [formula(x) for x in state.u.tolist()]
         for entries, kept_names in ((self._q, names.coordinates), (self._u, names.speeds)):
@@ -134,16 +134,16 @@ class _FormulaEquations:
         self.symbols[name] = symbol = self._book.symbol(name, value)
         return symbol
 
-    def counted(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
+    def count_terms(self, matrices: Sequence[Rows]) -> Sequence[Rows]:
         """Count the terms of matrices that will be converted, and return the matrices."""
         terms = sum(len(x.terms) for rows in matrices for row in rows for x in row)
-        self._book.count(_PRODUCTS_PER_TERM * terms)
+        self._book.count_products(_PRODUCTS_PER_TERM * terms)
         return matrices
 
     def second_order(self) -> tuple[Rows, Rows, Rows]:
         """Matrices M, C and K."""
         linear = self._linear
-        structure, p = structure_and_numbers(self._system, self._known)
+        structure, p = structure_and_numbers(self._system, self._user_elements)
         input_values = self._system.inputs_at(linear.state.t).tolist()
         indices = dict(structure.inputs)
         for entry, index in indices.items():
@@ -163,7 +163,7 @@ class _FormulaEquations:
         m, c, k = (_rows(outputs[name], len(linear)) for name in "MCK")
         if linear.rate_matrix is None:
             return m, c, k
-        if not all(x.fixed for x in outputs["N"]):
+        if not all(x.is_constant for x in outputs["N"]):
             raise SceneError(
                 "symbolic: kept numbers affect the relation of coordinates and speeds of a hinge; "
                 "linearize at rest, or leave them numbers"
@@ -188,7 +188,7 @@ class _FormulaEquations:
         is_zero = np.abs(linear.state.udot) <= _MAX_ZERO_ACCELERATION * scale
         return [formula(x) for x in np.where(is_zero, 0.0, linear.state.udot).tolist()]
 
-    def pushed(self, pushes: Sequence[Channel]) -> Rows:
+    def input_matrix(self, pushes: Sequence[Channel]) -> Rows:
         """Input matrix V or W, from the efforts of the tree at rest under a symbol per input.
 
         The efforts are proportional to the symbols.
@@ -197,7 +197,9 @@ class _FormulaEquations:
         if not pushes:
             return [[] for _ in range(n)]
         symbols = [self._book.symbol(channel.name, 1.0) for channel in pushes]
-        structure, p = structure_and_numbers(self._under(pushes, symbols), self._known)
+        structure, p = structure_and_numbers(
+            self._loaded_tree(pushes, symbols), self._user_elements
+        )
         zeros = [formula(0.0)] * len(self._u)
         kernel = fuse_required(structure, self._kernels)
         required = self._run(kernel, p, zeros, zeros)["required"]
@@ -209,7 +211,7 @@ class _FormulaEquations:
             for row in range(n)
         ]
 
-    def _under(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
+    def _loaded_tree(self, pushes: Sequence[Channel], symbols: Sequence[Formula]) -> System:
         """Tree whose only gravity and loads are the symbols of `pushes`."""
         gravity: list[Any] = [0.0, 0.0, 0.0]
         loads = []
@@ -221,7 +223,7 @@ class _FormulaEquations:
         return replace(
             self._system, gravity=tuple(gravity), laws=(), forces=(), loads=tuple(loads),
             values=self._values(len(pushes)) if loads else None, drives=None, driven=(),
-            moving=dict(enumerate(symbols)),
+            seeded_numbers=dict(enumerate(symbols)),
         )  # fmt: skip
 
     def _load(self, push: Channel, place: int) -> LoadNumbers:

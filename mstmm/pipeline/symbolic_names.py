@@ -29,7 +29,7 @@ class _Motion:
     """Coordinate or speed: the table for its name, its index, and whether it is free."""
 
     among: dict[int, str]
-    place: int
+    index: int
     free: bool
 
 
@@ -53,7 +53,7 @@ def resolve_kept_names(linear: LinearEquations, keep: Sequence[str]) -> SymbolNa
                     "speed, found one that a drive imposes or that is no integral of a speed; "
                     "leave it a number"
                 )
-            is_duplicate = motion.among.setdefault(motion.place, name) != name
+            is_duplicate = motion.among.setdefault(motion.index, name) != name
         elif name in numbers or f"{name}[0]" in numbers:
             (full_name,) = scene_parameters.resolve_names(linear.model.scene, [name])
             is_duplicate = symbol_names.parameters.setdefault(full_name, name) != name

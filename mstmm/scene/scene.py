@@ -137,7 +137,7 @@ class Scene(SceneTables, NotebookDisplay):
         return {table: getattr(self, table) for table in TABLES}
 
     @model_validator(mode="after")
-    def _settle(self) -> Scene:
+    def _resolve_references(self) -> Scene:
         for table in _AUTO_NAMED_TABLES:
             object.__setattr__(self, table, _name_elements(table, getattr(self, table)))
         for table, elements in _tables_with_beam_roots(self).items():

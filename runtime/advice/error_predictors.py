@@ -73,7 +73,7 @@ class ErrorPrediction:
         if choice.level == ONE_WAY:
             recoil = _RECOIL * chi / (1 - chi) if chi < 1 else _MAX_ONE_WAY
             return d * min(recoil, _MAX_ONE_WAY) + shortening
-        left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps(name))
+        left_out = sum(size for name, size in self.by_shape.items() if not choice.keeps_shape(name))
         return left_out + (shortening if choice.level == LINEAR else 0.0)
 
     def rise(self, until: float) -> float:

@@ -116,12 +116,12 @@ class _ChartBuilder:
         self, model: Model, request: ChartRequest, compile: Callable[[Scene], Model],
         report: Report, report_status: Callable[[str], None], budget: Budget,
     ) -> None:  # fmt: skip
-        if model.closed is None:
+        if model.loop_start is None:
             request = replace(request, methods=without_index3_duplicates(request.methods))
         self.model, self.request, self.compile = model, request, compile
         self.report, self.report_status, self.budget = report, report_status, budget
         self.times = equidistant_times(request.t_end, request.samples)
-        self.runs = Runs(request.t_end, self.times.at, budget)
+        self.runs = Runs(request.t_end, self.times.times, budget)
         self.skipped: list[Skipped] = []
         self.model_levels: list[Level] = []
 
@@ -145,8 +145,8 @@ class _ChartBuilder:
         if reference.is_static:
             curves = []
         survey = Survey(best.run, measure, self.runs, self.report)
-        survey.make([curve for curve in curves if curve.method in PROMISING], EARLY)
-        surveyed = survey.make(
+        survey.run_curves([curve for curve in curves if curve.method in PROMISING], EARLY)
+        surveyed = survey.run_curves(
             [curve for curve in curves if curve.method not in PROMISING], SETTINGS
         )
         points, missed = repeat_timings(
@@ -167,9 +167,9 @@ class _ChartBuilder:
             bound_errors(points, reference, level_errors)
         )
         return Chart(
-            title, request.t_end, len(self.times.at), reference, points_with_bounds,
+            title, request.t_end, len(self.times.times), reference, points_with_bounds,
             tuple(self.model_levels), (*self.skipped, *surveyed.skipped), request.error,
-            request.budget, self.budget.elapsed, self.times.words,
+            request.budget, self.budget.elapsed, self.times.description,
             (*scene_warnings(richest.scene), *common_warnings),
         )  # fmt: skip
 
@@ -177,18 +177,18 @@ class _ChartBuilder:
         """Add times where the motion is fast, unless the run for that takes too long."""
         self.report("run to choose the times of the error")
         setting = Setting(AUTO, name, _STEP_SIZE_RTOL)
-        steps = self.runs.steps(richest, setting, self.budget.share(REFERENCE))
+        steps = self.runs.steps(richest, setting, self.budget.run_limit(REFERENCE))
         if not len(steps):
             return
         self.times = refine_times(equidistant_times(steps[-1], self.request.samples), steps)
-        self.runs.times = self.times.at
+        self.runs.times = self.times.times
 
     def _report_reference(self, reference: Reference) -> None:
         """Report the reference, and the times at which errors are evaluated."""
         self.report_status(
             f"reference: {reference.made_by}; its own error is {reference.error:.1e}"
         )
-        self.report_status(f"errors are evaluated at {self.times.words}")
+        self.report_status(f"errors are evaluated at {self.times.description}")
         if reference.stop_event:
             self.report_status(f"runs end before {self.request.t_end:g} s: {reference.stop_event}")
         if reference.is_static:
@@ -262,7 +262,7 @@ class _ChartBuilder:
 
         An accurate level needs the setting of the reference for that.
         """
-        limit = self.budget.share(_LEVEL_BUDGET)
+        limit = self.budget.run_limit(_LEVEL_BUDGET)
         run = self.runs.trial(model, Setting(AUTO, level, _LEVEL_RTOL), measure, limit)
         if run.numbers is None:
             return run
@@ -276,7 +276,7 @@ class _ChartBuilder:
 
 def _degrees_of_freedom(model: Model) -> int:
     """Number of degrees of freedom; of a mechanism, its mobility."""
-    return model.nu if model.closed is None else model.closed.loops.mobility
+    return model.nu if model.loop_start is None else model.loop_start.loops.mobility
 
 
 def _is_static(q: Array) -> bool:

@@ -53,7 +53,7 @@ class ChartRecord:
         return pareto_front(self.points, self.reference.smallest_resolved_error)
 
     def recommend(self, error: float | None = None) -> Point:
-        """Cheapest point whose error bound does not exceed `error` (default: `wanted`).
+        """Cheapest point whose error bound does not exceed `error` (default: `target_error`).
 
         Raises SceneError for an error that is not above 0, and NumericalFailure, with the smallest
         error that was reached, if no point meets it or the reference is not accurate enough.

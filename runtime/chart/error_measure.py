@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ..result.result_record import Record
 
 
-class Places(Measure):
+class PositionMeasure(Measure):
     """Positions of all bodies and ends, relative to the scene length; for any level.
 
     Flexible bodies are compared at their ends only: the position of the floating frame depends on
@@ -60,4 +60,4 @@ def select_measure(
     """
     if names:
         return Quantities(start, names)
-    return Places(model, start) if models else Coordinates(model)
+    return PositionMeasure(model, start) if models else Coordinates(model)

@@ -131,14 +131,14 @@ def _legend(entries: Sequence[Entry], keys: dict[str, int]) -> str:
     items = []
     for entry in entries:
         text = escape(escape_control_characters(entry.text))
-        if entry.look is None:
+        if entry.style is None:
             items.append(f'<li class="{"head" if entry.strong else "note"}">{text}</li>')
             continue
         key = f" e{keys[entry.text]}" if entry.text in keys else ""
-        shape = marker_svg(entry.look, 7, 7, 5)
+        shape = marker_svg(entry.style, 7, 7, 5)
         items.append(
             f'<li class="{"strong" if entry.strong else "faint"}{key}"><svg viewBox="0 0 14 14" '
-            f'fill="{entry.look.colour}">{shape}</svg>{text}</li>'
+            f'fill="{entry.style.colour}">{shape}</svg>{text}</li>'
         )
     return f'<ul class="keys">{"".join(items)}</ul>'
 

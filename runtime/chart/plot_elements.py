@@ -16,7 +16,7 @@ from .method_families import FAMILIES, family
 from .pareto_front import pareto_front
 from .plot_styles import PlotStyle, family_mark, level_colours, method_styles
 
-Place = tuple[float, float]
+Position = tuple[float, float]
 
 #: Points with an error above this many times the median error of the first points of all curves are
 #: outside the plot.
@@ -40,21 +40,21 @@ _LABEL_OFFSETS = (
 
 @dataclass(frozen=True)
 class Line:
-    """Points with the same style; `joined` by a line, and `strong` if emphasised."""
+    """Points with the same style; `is_connected` by a line, and `is_emphasised` if emphasised."""
 
     name: str
-    look: PlotStyle
-    points: tuple[tuple[Place, Point], ...]
-    joined: bool
-    strong: bool
+    style: PlotStyle
+    points: tuple[tuple[Position, Point], ...]
+    is_connected: bool
+    is_emphasised: bool
 
 
 @dataclass(frozen=True)
 class Label:
-    """Text near the point at `place`; its centre is offset by `at` (right, down), in 1/72 in."""
+    """Text near the point at `position`; its centre is offset by `at` (right, down), in 1/72 in."""
 
     text: str
-    place: Place
+    position: Position
     at: tuple[float, float]
 
 
@@ -63,7 +63,7 @@ class Entry:
     """Row of the legend: a name with a style; without style a heading if `strong`, else a note."""
 
     text: str
-    look: PlotStyle | None = None
+    style: PlotStyle | None = None
     strong: bool = True
 
 
@@ -74,7 +74,7 @@ class Drawing:
     x: tuple[float, float]
     y: tuple[float, float]
     lines: list[Line]
-    pareto_front: list[Place]
+    pareto_front: list[Position]
     floor: float
     labels: list[Label]
     legend: list[Entry]
@@ -146,7 +146,7 @@ def _empty_reason(chart: ChartRecord, shown: Sequence[Point]) -> str:
     return "no run has an error above zero" if errors else "no run was completed"
 
 
-def plot_position(point: Point) -> Place | None:
+def plot_position(point: Point) -> Position | None:
     """(log10 error, log10 s); None for a failed run, or without error or CPU time above 0."""
     if not point.error or not point.cpu_s:
         return None
@@ -154,8 +154,8 @@ def plot_position(point: Point) -> Place | None:
 
 
 def _limits(
-    shown: Sequence[Point], positions: dict[int, Place], floor: float
-) -> tuple[Place, Place]:
+    shown: Sequence[Point], positions: dict[int, Position], floor: float
+) -> tuple[Position, Position]:
     """Limits (x, y) of the axes; `floor` is the smallest error that the reference resolves."""
     if not shown:
         return (0.0, -12.0), (-4.0, 0.0)
@@ -178,7 +178,7 @@ def _limits(
 
 
 def _method_lines(
-    points: Sequence[Point], positions: dict[int, Place], front: Sequence[Point]
+    points: Sequence[Point], positions: dict[int, Position], front: Sequence[Point]
 ) -> list[Line]:
     """One line per method; methods with a point on the Pareto front are strong."""
     methods = _sorted_by_family(p.method for p in points)
@@ -187,11 +187,14 @@ def _method_lines(
     for method in methods:
         path = tuple((positions[id(p)], p) for p in points if p.method == method)
         lines.append(Line(method, styles[method], path, True, method in strong_methods))
-    return sorted(lines, key=lambda line: line.strong)
+    return sorted(lines, key=lambda line: line.is_emphasised)
 
 
 def _level_lines(
-    points: Sequence[Point], positions: dict[int, Place], levels: Sequence[str], chart: ChartRecord
+    points: Sequence[Point],
+    positions: dict[int, Position],
+    levels: Sequence[str],
+    chart: ChartRecord,
 ) -> list[Line]:
     """Per model level: faint lines of its methods, and its own Pareto front as a strong line."""
     colours, lines = level_colours(levels), []
@@ -225,13 +228,15 @@ def _sorted_by_family(methods: Iterable[str]) -> list[str]:
     return sorted(names, key=lambda name: FAMILIES.index(family(name)))
 
 
-def _labels(positions: Sequence[Place], names: Sequence[str], x: Place, y: Place) -> list[Label]:
+def _labels(
+    positions: Sequence[Position], names: Sequence[str], x: Position, y: Position
+) -> list[Label]:
     """Labels where the method (or level) of the Pareto front changes, if there is free space.
 
     A name is repeated only far from its previous label.
     """
 
-    def plot_coordinates(position: Place) -> Place:
+    def plot_coordinates(position: Position) -> Position:
         right = (position[0] - x[0]) / (x[1] - x[0]) * _PLOT_SIZE[0]
         return right, (y[1] - position[1]) / (y[1] - y[0]) * _PLOT_SIZE[1]
 
@@ -294,7 +299,7 @@ def _legend(lines: Sequence[Line], points: Sequence[Point], levels: Sequence[str
         if heading not in entries:
             entries.append(heading)
         line = line_by_method[method]
-        entries.append(Entry(method, line.look, line.strong))
+        entries.append(Entry(method, line.style, line.is_emphasised))
     return entries
 
 

@@ -42,7 +42,7 @@ class Budget:
         """Time until this fraction of the budget is spent, s, 0 or more."""
         return max(0.0, part * self.seconds - self.elapsed)
 
-    def share(self, part: float, waiting: int = 1) -> float:
+    def run_limit(self, part: float, waiting: int = 1) -> float:
         """Time limit of the next run, s, while `waiting` curves are not finished."""
         return self.remaining(part) / max(_MIN_SHARES, waiting / _CURVES_PER_SHARE)
 

@@ -14,7 +14,7 @@ from ..kernels import kernel_store
 from ..packing import product_sweep
 from ..packing import scene_parameters as named_parameters
 from ..packing.coordinate_layout import Layout
-from ..packing.merging.simplification import LINKED, Simplification, Words
+from ..packing.merging.simplification import LINKED, Simplification, SimplifyOptions
 from ..packing.packed_scene import PackedScene, resize_workspace
 from ..packing.scene_elements import Known
 from ..packing.scene_packing import pack, without_merging
@@ -29,7 +29,9 @@ from .loops.independent_speeds import IndependentSpeeds
 from .loops.loop_analysis import LoopStart
 
 #: Options of a compilation: fused code, accuracy of the plain product, sweep, simplifications.
-CompileOptions = tuple[Callable[[PackedScene, Known], FusedCode] | None, float | None, str, Words]
+CompileOptions = tuple[
+    Callable[[PackedScene, Known], FusedCode] | None, float | None, str, SimplifyOptions
+]
 
 
 class CompiledScene:
@@ -51,7 +53,7 @@ class CompiledScene:
         fusing: Callable[[PackedScene, Known], FusedCode] | None = None,
         product_accuracy: float | None = None,
         sweep: str = "riccati",
-        simplify: Words = LINKED,
+        simplify: SimplifyOptions = LINKED,
     ) -> None:
         self.scene = scene
         self._fusing, self._product_accuracy, self.sweep = fusing, product_accuracy, sweep
@@ -60,13 +62,13 @@ class CompiledScene:
             pack(scene, known, product_accuracy, sweep=sweep, simplify=self._simplify)
         )
         self.known = self.packed_scene.elements.known
-        self.closed: LoopStart | None = None
-        if self.packed_scene.system.closes:
+        self.loop_start: LoopStart | None = None
+        if self.packed_scene.system.has_loops:
             try:
-                self.closed = LoopStart(self.looped, len(self.free_speed_indices))
+                self.loop_start = LoopStart(self.looped, len(self.free_speed_indices))
             except NumericalFailure as failure:
                 raise SceneError(f"scene: {failure}") from None
-            self.looped = self.closed.engine
+            self.looped = self.loop_start.engine
             if product_accuracy is not None:
                 product_sweep.enable_product_sweep(self.packed_scene, product_accuracy)
                 resize_workspace(self.packed_scene, self.packed_scene.written.slots)
@@ -76,10 +78,15 @@ class CompiledScene:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the scene and its options; unpickling searches for compiled code again."""
-        return _unpickle, (type(self), self.scene, self._asked, self.fusion.library is not None)
+        return _unpickle, (
+            type(self),
+            self.scene,
+            self._compile_options,
+            self.fusion.library is not None,
+        )
 
     @property
-    def _asked(self) -> CompileOptions:
+    def _compile_options(self) -> CompileOptions:
         return self._fusing, self._product_accuracy, self.sweep, self._simplify
 
     @cached_property
@@ -91,7 +98,7 @@ class CompiledScene:
         engine = LoopedEngine(packed)
         return (
             engine
-            if self.closed is None
+            if self.loop_start is None
             else LoopStart(engine, len(self.free_speed_indices)).engine
         )
 
@@ -163,10 +170,10 @@ class CompiledScene:
     @cached_property
     def independent_speeds(self) -> IndependentSpeeds | None:
         """Independent speeds of closed loops; None for a tree."""
-        if self.closed is None:
+        if self.loop_start is None:
             return None
         return IndependentSpeeds(
-            self.looped, self.free_speed_indices, speed_scales(self), self.closed
+            self.looped, self.free_speed_indices, speed_scales(self), self.loop_start
         )
 
     @cached_property
@@ -221,13 +228,13 @@ class CompiledScene:
             if not isinstance(getattr(type(self), name, None), cached_property)
         }  # fmt: skip
         copy = object.__new__(type(self))
-        copy.__dict__.update(attributes, scene=packed.described, looped=LoopedEngine(packed))
+        copy.__dict__.update(attributes, scene=packed.user_scene, looped=LoopedEngine(packed))
         copy.fusion = self.fusion.for_system(packed.system)
         return copy
 
     def _with(self, scene: Scene) -> Self:
         """Compile the same scene with other numbers and the same options."""
-        recompiled = type(self)(scene, self.known, *self._asked)
+        recompiled = type(self)(scene, self.known, *self._compile_options)
         recompiled.fusion.follow(self.fusion)
         return recompiled
 

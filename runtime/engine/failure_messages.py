@@ -21,7 +21,7 @@ class ElementNames(Protocol):
     def hinge_name(self, position: int, /) -> str: ...
     def body_name(self, position: int, /) -> str: ...
     def is_flexible(self, position: int, /) -> bool: ...
-    def closing(self, position: int, /) -> str: ...
+    def closing_label(self, position: int, /) -> str: ...
 
 
 def failure_text(engine: ElementNames, reason: int, element: int, code: int, t: float) -> str:
@@ -122,7 +122,7 @@ def _tangent_text(engine: ElementNames, element: int, at: str, code: int) -> str
 
 
 def _controller_text(engine: ElementNames, element: int, at: str, code: int) -> str:
-    name = engine.packed.described.controller[element].name
+    name = engine.packed.user_scene.controller[element].name
     return (
         f'controller "{name}" {at}: its measurement or output is not finite; check whether the '
         "closed loop is stable, perhaps with a shorter sample_time"
@@ -130,12 +130,12 @@ def _controller_text(engine: ElementNames, element: int, at: str, code: int) -> 
 
 
 def _loop_text(engine: ElementNames, element: int, at: str, code: int) -> str:
-    remedy = engine.packed.behind() or (
+    remedy = engine.packed.find_loop_cause() or (
         "start from model.assemble(q, u), or check whether links are stretched out in line "
         "(model.loops.singular), or a drive requires a motion that the mechanism cannot make"
     )
     return (
-        f"{engine.closing(element)} {at}: the loop that it closes is open, and no state near "
+        f"{engine.closing_label(element)} {at}: the loop that it closes is open, and no state near "
         f"closes it; {remedy}"
     )
 
@@ -149,14 +149,15 @@ def _coupling_text(engine: ElementNames, element: int, at: str, code: int) -> st
 
 def _flat_disc_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     return (
-        f"{engine.closing(element)} {at}: the disc is flat on its plane and touches it in more "
+        f"{engine.closing_label(element)} {at}: the disc is flat on its plane and touches it in "
+        f"more "
         "than a point; end the run before that by an [[event]], or start it upright"
     )
 
 
 def _bounce_text(engine: ElementNames, element: int, at: str, code: int) -> str:
     return (
-        f"{engine.packed.described.happening(element)} {at}: no motion can respond to its "
+        f"{engine.packed.user_scene.event_label(element)} {at}: no motion can respond to its "
         "impact, because what it hits is driven or held; use another place for the bounce, or "
         "release the hinge"
     )

@@ -72,7 +72,7 @@ class LoopedEngine(EngineCalls):
             raise self.not_finite(f"the effort of {name}", t, q, u)
         return efforts
 
-    def required_by_inertia(self, q: Array, accelerations: Array) -> Array:
+    def mass_matrix_product(self, q: Array, accelerations: Array) -> Array:
         """Product of M(q) and n accelerations (n, nu), all speeds free; O(bodies) each."""
         engine, zero_speeds = self.inertia_only, np.zeros(self.nu)
         memory = engine.start_memory()
@@ -108,7 +108,7 @@ class LoopedEngine(EngineCalls):
     def mass_matrix(self, q: Array) -> Array:
         """Symmetric mass matrix (nu, nu) of one state; driven coordinates count as free."""
         if self.packed.layout.modal:
-            matrix = self.required_by_inertia(q, np.eye(self.nu)).T
+            matrix = self.mass_matrix_product(q, np.eye(self.nu)).T
             return np.asarray((matrix + matrix.T) / 2)
         engine, failure = self.inertia_only, self.ffi.new("mstmm_failure *")
         mass_matrix_values, work = np.empty((self.nu, self.nu)), np.empty(2 * self.nu)
@@ -135,7 +135,7 @@ class LoopedEngine(EngineCalls):
         """
         engine = self.inertia_only
         memory = engine.start_memory() if memory is None else memory
-        if self.packed.qr or self.packed.refined or self.packed.system.closes:
+        if self.packed.qr or self.packed.refined or self.packed.system.has_loops:
             # Time-dependent couplings cause motion without efforts: subtract it by a zero column.
             columns = np.vstack([columns, np.zeros(self.nu)])
             n, zero_speeds = len(columns), np.zeros(columns.shape)

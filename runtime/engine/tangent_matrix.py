@@ -41,13 +41,14 @@ class TangentMatrix:
         self.numbers = np.zeros(max(1, _lay_out_tangent(engine)))
         self.work = np.zeros(engine.lib.mstmm_tangent_work(model, slopes.slots))
         across = off_tree_coupling(engine)
-        self.couplings, self.coupled = across.written(engine), across.count
-        self.answers = np.zeros(max(1, len(across.passes) * self.nu))
-        self.closure = np.zeros(self.coupled * (across.width + 4) + 1)
+        self.couplings, self.off_tree_count = across.written(engine), across.count
+        self.solutions = np.zeros(max(1, len(across.passes) * self.nu))
+        self.closure = np.zeros(self.off_tree_count * (across.width + 4) + 1)
         self.record = record = ffi.new("mstmm_tangent *")
         record.model, record.slots = model, slopes.slots
-        record.couplings, record.n_coupled = self.couplings[0], self.coupled
-        for name in ("workspace", "memory", "work", "numbers", "answers", "closure"):
+        record.couplings, record.n_coupled = self.couplings[0], self.off_tree_count
+        record.answers = engine.pointer(self.solutions)
+        for name in ("workspace", "memory", "work", "numbers", "closure"):
             setattr(record, name, engine.pointer(getattr(self, name)))
 
     def residual(self, t: float, q: Array, u: Array, a: Array | None = None) -> Array:
@@ -145,7 +146,7 @@ class TangentMatrix:
         bodies, because pivots do not contain these loads.  Factorisations with negative pivots fail
         unless `allow_negative` was called before.
         """
-        if self.coupled:
+        if self.off_tree_count:
             return None
         sizes, pivots = self.pivots()
         return int(count_negative(pivots[None], sizes)[0])

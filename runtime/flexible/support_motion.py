@@ -51,7 +51,7 @@ class Supports:
         self._bodies = {body.name: body for body in scene.body if body.type == "rigid"}
         self._released = {event.hinge for event in scene.event if event.hinge}
 
-    def of(self, name: str) -> Support:
+    def support_of(self, name: str) -> Support:
         """Support of a flexible body: its inboard hinge and rigid bodies.
 
         They are followed up to the ground or to another flexible body.

@@ -46,7 +46,7 @@ def c_tableau(ffi: Any, tableau: Tableau) -> Any:
     record.mix, record.is_read = doubles(tableau.block_weights), integers(tableau.shared_blocks)
     if isinstance(tableau, Implicit):
         record.kind, record.gamma = tableau.kind, tableau.gamma
-        record.n_inner, record.inner = len(tableau.inner), doubles(tableau.inner)
+        record.n_inner, record.inner = len(tableau.inner_nodes), doubles(tableau.inner_nodes)
         record.quadrature, record.roughness = (
             doubles(tableau.quadrature),
             doubles(tableau.roughness),

@@ -42,7 +42,7 @@ class Motion(NamedTuple):
 
 
 #: Driven speeds of one common motion: (index, factor) each.
-Moves = tuple[tuple[int, float], ...]
+DriveFactors = tuple[tuple[int, float], ...]
 
 
 class Columns(NamedTuple):
@@ -77,13 +77,13 @@ def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]
     """Yield (slots of the hinge, index of its coordinate, drive) of all driven coordinates."""
     packed = model.packed_scene
     for place, k in packed.system.driven:
-        number = packed.topology.at(place)[1]
+        number = packed.topology.scene_indices(place)[1]
         drive = (packed.scene.hinges[number].drive or ())[k]
         if drive is not None:
             yield model.coordinate_layout.slots(number), k, drive
 
 
-def accelerations(model: CompiledScene, moves: Moves) -> list[str]:
+def accelerations(model: CompiledScene, moves: DriveFactors) -> list[str]:
     """Names of the accelerations of the drives in `moves`."""
     speeds = {speed for speed, _ in moves}
     return [x for x, one in motions(model).items() if one.order == 2 and one.speed in speeds]
@@ -95,7 +95,7 @@ def coordinate(model: CompiledScene, speed: int) -> str:
     return f"{slots.name}.{slots.q_names[speed - slots.u]}"
 
 
-def followers(model: CompiledScene, name: str, t: float) -> Moves:
+def followers(model: CompiledScene, name: str, t: float) -> DriveFactors:
     """Drives that follow an input of the scene, with their slopes with respect to it.
 
     Raises SceneError where a slope depends on time.
@@ -106,7 +106,7 @@ def followers(model: CompiledScene, name: str, t: float) -> Moves:
         if name not in names:
             continue
         if not slots.rates_are_speeds or not all(
-            x in channels and channels[x].stands for x in names
+            x in channels and channels[x].is_constant for x in names
         ):
             raise SceneError(
                 f'"{name}": the drive of hinge "{slots.name}" follows this input, and goes by time '
@@ -118,20 +118,20 @@ def followers(model: CompiledScene, name: str, t: float) -> Moves:
     return tuple(found.items())
 
 
-def columns_of(engine: LoopedEngine, state: State, moves: Moves) -> Columns:
+def drive_columns(engine: LoopedEngine, state: State, moves: DriveFactors) -> Columns:
     """Columns (nu,) of drives of a tree that follow one common motion."""
     along = np.zeros(engine.nu)
     for speed, factor in moves:
         along[speed] += factor
-    return slopes_along(engine, state, along)
+    return residual_derivatives(engine, state, along)
 
 
-def slopes_along(engine: LoopedEngine, state: State, along: Array) -> Columns:
+def residual_derivatives(engine: LoopedEngine, state: State, along: Array) -> Columns:
     """Slopes (nu,) of the residual along a motion of all speeds.
 
     Driven speeds, which are the rates of their coordinates, are included.
     """
-    first, driven = engine.packed.system.places["u"], engine.packed.system.driven
+    first, driven = engine.packed.system.first_indices["u"], engine.packed.system.driven
     engine = _undriven(engine)
     tangent, still = TangentMatrix(engine), np.zeros(engine.nu)
     moved, at_rest = tangent.rates(state.q, along), np.zeros(engine.nq)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .linear_equations import LinearEquations
 
 
-def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
+def operator_products(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[Any]:
     """Product (n, k) of a real operator and each shape, complex shapes in two parts."""
     columns = [
         product(x.real) + (1j * product(x.imag) if np.iscomplexobj(x) else 0.0) for x in shapes.T
@@ -33,10 +33,10 @@ def along(product: Callable[[Array], Array], shapes: NDArray[Any]) -> NDArray[An
 
 def kinetic(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each body in the kinetic energy of each shape."""
-    return kinetic_of_speeds(linear.model, linear.state.q, linear.expand(shapes))
+    return kinetic_shares(linear.model, linear.state.q, linear.expand(shapes))
 
 
-def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
+def kinetic_shares(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each body in the kinetic energy of speeds (nu, k) at q (nq,)."""
     engine, parts = model.unmerged_engine, [np.real(speeds)]
     if np.iscomplexobj(speeds):
@@ -50,15 +50,17 @@ def kinetic_of_speeds(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> d
     return _parts(names, energies[:, bodies].T)
 
 
-def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
+def strain_shares(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     """Share (k,) of each owner of coordinates, and of "springs", in the elastic energy."""
     tree, free = linear.open_tree, list(linear.model.free_speed_indices)
     shapes = linear.expand(shapes)[free]
     whole, lawless, held = (
-        along(_pressed(linear, engine), shapes)
+        operator_products(_stiffness_operator(linear, engine), shapes)
         for engine in (tree, without_laws(tree), with_frozen_springs(tree, linear.state))
     )
-    own = np.real(np.conj(shapes) * (whole - lawless + _by_shapes(linear.model, shapes)))
+    own = np.real(
+        np.conj(shapes) * (whole - lawless + _modal_stiffness_product(linear.model, shapes))
+    )
     names = [name.rpartition(".")[0] for name, _ in linear.model.tangent_increments]
     if not linear.model.scene.forces:
         return _parts(names, own)
@@ -66,7 +68,7 @@ def strain(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Array]:
     return _parts([*names, "springs"], np.vstack([own, sprung]))
 
 
-def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
+def _stiffness_operator(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
     """Operator K x of a scene, with x' = G x + du."""
     pencil = Pencil(engine, linear.state, list(linear.model.free_speed_indices))
     turning = linear.rate_matrix if linear.constrained_motion is None else None
@@ -75,7 +77,7 @@ def _pressed(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
     return lambda x: pencil.stiffness(x) - pencil.damping(turning @ x)
 
 
-def _by_shapes(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
+def _modal_stiffness_product(model: CompiledScene, x: NDArray[Any]) -> NDArray[Any]:
     """Product (n, k) of the stiffness of flexible bodies and increments x of all free speeds."""
     moved = np.zeros((model.nu, x.shape[1]), dtype=x.dtype)
     moved[list(model.free_speed_indices)] = x

@@ -18,18 +18,29 @@ from numpy.typing import ArrayLike, NDArray
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ..engine.characteristic_scales import speed_scales
 from ..engine.harmonic_response import HarmonicResponse
 from ..risk_checks.shape_range import response_range_risks
 from . import file_formats
-from .harmonic.damping_checks import is_requested, refuse_drives, refuse_in_motion, refuse_ratios
-from .harmonic.exact_beams import Chosen, ExactBeams, exact_beams, refuse_distributed, refuse_inner
+from .harmonic.damping_checks import (
+    check_state_at_rest,
+    is_requested,
+    reject_drives,
+    reject_modal_damping,
+)
+from .harmonic.exact_beams import (
+    BeamSelection,
+    ExactBeams,
+    exact_beams,
+    reject_distributed,
+    reject_inner_names,
+)
 from .harmonic.harmonic_solve import Amplitudes
 from .harmonic.hysteretic_damping import Losses, stiffer
 from .harmonic.modal_damping import Ratios, modal_damping
-from .harmonic.steady_states import find_time_risks, refuse_turning, refuse_unsteady
+from .harmonic.steady_states import check_steady, find_time_risks, reject_rotating_balls
 from .harmonic.unshaped_response import unshaped_response_risks
 from .harmonic_loads import HarmonicLoads
 from .input_channels import Channel, channel, some_names
@@ -61,7 +72,7 @@ _FASTEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyResponse(AssessedAnswer):
+class FrequencyResponse(AssessedResult):
     """Amplitudes of outputs under inputs cos(omega t) of unit amplitude.
 
     Attributes:
@@ -169,30 +180,30 @@ def frequency_response(
     outputs: Sequence[str] | None,
     structural: Losses = 0.0,
     modal: Ratios = 0.0,
-    exact: Chosen = False,
+    exact: BeamSelection = False,
 ) -> FrequencyResponse:
     """Frequency response of a linear model; see `Linear.frequency_response`."""
     frequencies = angular_frequencies(omega)
     beams = None
     if exact is not False:
-        refuse_turning(linear)
-        refuse_ratios(modal)
+        reject_rotating_balls(linear)
+        reject_modal_damping(modal)
         beams = exact_beams(linear, exact, structural)
-        refuse_inner(beams, [*(inputs or ()), *read_by(linear, outputs)])
+        reject_inner_names(beams, [*(inputs or ()), *read_by(linear, outputs)])
         linear = beams.linear
         if outputs is None and not linear.model.scene.output:
-            outputs = [name for name in linear.coordinate_names if not beams.named(name)]
+            outputs = [name for name in linear.coordinate_names if not beams.has_coordinate(name)]
             if not outputs:
                 raise SceneError(
                     "exact: all coordinates are shapes of beams; name outputs, such as "
                     f'"{beams.names[0]}.tip.y"'
                 )
-    pushes = chosen_pushes(linear, inputs)
+    pushes = select_inputs(linear, inputs)
     if beams is not None:
-        refuse_distributed(beams, pushes)
-    refuse_drives(pushes, beams is not None or is_requested(structural))
+        reject_distributed(beams, pushes)
+    reject_drives(pushes, beams is not None or is_requested(structural))
     shown = outputs_of(linear, None if outputs is None else some_names("outputs", outputs))
-    refuse_unsteady(linear, pushes, shown)
+    check_steady(linear, pushes, shown)
     values = _Sweep(linear, pushes, shown, structural, modal, beams).values(frequencies)
     exact_names = () if beams is None else beams.names
 
@@ -237,7 +248,7 @@ def angular_frequencies(omega: ArrayLike) -> Array:
     return found
 
 
-def chosen_pushes(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
+def select_inputs(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
     """Named inputs, else those of the model, else its disturbances; SceneError for none."""
     if inputs is not None:
         return [channel(linear.model, name) for name in some_names("inputs", inputs)]
@@ -264,14 +275,14 @@ class _Sweep:
         structural: Losses, modal: Ratios, beams: ExactBeams | None,
     ) -> None:  # fmt: skip
         engine, free = linear.open_tree, list(linear.free_speed_indices)
-        refuse_in_motion(linear, structural, modal)
+        check_state_at_rest(linear, structural, modal)
         lossy = stiffer(linear, structural) if is_requested(structural) else None
         self.modal = modal_damping(linear, modal) if is_requested(modal) else None
         self.engine, self.response = engine, _response(linear, lossy, beams)
         efforts = np.zeros((len(pushes), engine.nu))
         efforts[:, free] = _efforts(linear, pushes).T
-        self.pushed = HarmonicLoads.of(linear, pushes, efforts)
-        self.columns, self.count = self.pushed.columns, len(self.pushed.columns)
+        self.loads = HarmonicLoads.from_efforts(linear, pushes, efforts)
+        self.columns, self.count = self.loads.columns, len(self.loads.columns)
         if self.modal is not None:
             damping = np.zeros((self.modal.columns.shape[1], engine.nu))
             damping[:, free] = self.modal.columns.T
@@ -279,8 +290,10 @@ class _Sweep:
         self.free, rows = free, rows_of(linear, outputs, pushes)
         self.sizes = speed_scales(linear.model)
         self.rows = {order: wide[:, free] for order, wide in rows.orders.items()}
-        self.carried = {order: self.pushed.carried(wide) for order, wide in rows.orders.items()}
-        self.through = rows.through
+        self.drive_contributions = {
+            order: self.loads.drive_contributions(wide) for order, wide in rows.orders.items()
+        }
+        self.feedthrough = rows.feedthrough
 
     def values(self, omega: Array) -> Complex:
         """Response (k, outputs, inputs) at angular frequencies (k,)."""
@@ -291,15 +304,15 @@ class _Sweep:
     def values_and_rounding(self, omega: Array) -> tuple[Complex, Array]:
         """Response as by `values`, and its rounding level (outputs, inputs)."""
         s = np.asarray(1j * omega, dtype=np.complex128)
-        return self.values(omega), _NOISE * self._reach(s, self._at(s)[-1])
+        return self.values(omega), _NOISE * self._response_bound(s, self._evaluate(s)[-1])
 
     def _batch(self, omega: Array) -> Complex:
-        values, growth, grown, _ = self._at(np.asarray(1j * omega, dtype=np.complex128))
+        values, growth, grown, _ = self._evaluate(np.asarray(1j * omega, dtype=np.complex128))
         for k in np.flatnonzero(~(growth < _GROWN)):
-            values[k] = self._around(float(omega[k]), values[k], growth[k], int(grown[k]))
+            values[k] = self._circle_mean(float(omega[k]), values[k], growth[k], int(grown[k]))
         return values
 
-    def _at(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
+    def _evaluate(self, s: Complex) -> tuple[Complex, Array, NDArray[np.int32], Complex]:
         """Response at s (k,), with the growth of the elimination.
 
         Returns values (k, outputs, inputs), growth (k,), the bodies (k,) of largest growth, and
@@ -309,17 +322,17 @@ class _Sweep:
         moved = x[:, : self.count, self.free]
         if self.modal is not None:
             moved = self.modal.damp(s, moved, x[:, self.count :, self.free])
-        found = np.zeros((len(s), *self.through.shape), dtype=np.complex128)
-        found += self.through
+        found = np.zeros((len(s), *self.feedthrough.shape), dtype=np.complex128)
+        found += self.feedthrough
         for order, rows in self.rows.items():
             answers = rows @ moved.swapaxes(1, 2)
-            found += s[:, None, None] ** order * self.pushed.summed(s, answers)
-            for j, (power, column) in self.carried[order].items():
+            found += s[:, None, None] ** order * self.loads.sum_by_input(s, answers)
+            for j, (power, column) in self.drive_contributions[order].items():
                 found[:, :, j] += s[:, None] ** (order + power) * column
         growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
         return found, growth, grown, moved
 
-    def _around(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
+    def _circle_mean(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
         """Response where the elimination lost digits: the most accurate of it and circle means.
 
         Raises NumericalFailure at a resonance without damping.
@@ -328,9 +341,9 @@ class _Sweep:
         turns = np.exp(2j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
         for part in _CIRCLES:
             s = np.asarray(omega * (1j + part * turns), np.complex128)
-            values, growths, _, moved = self._at(s)
+            values, growths, _, moved = self._evaluate(s)
             lost = max(
-                _pole_share(values, turns, _NOISE * self._reach(s, moved)),
+                _pole_share(values, turns, _NOISE * self._response_bound(s, moved)),
                 _ROUNDING * float(growths.max()),
             )
             if lost < unknown:
@@ -346,7 +359,7 @@ class _Sweep:
             )
         return best
 
-    def _reach(self, s: Complex, moved: Complex) -> Array:
+    def _response_bound(self, s: Complex, moved: Complex) -> Array:
         """Bound (outputs, inputs) of the response at s (k,).
 
         It assumes that every coordinate moves as far, relative to its scale, as the one that moves
@@ -355,7 +368,7 @@ class _Sweep:
         sizes = self.sizes[self.free]
         most = (np.abs(moved) / sizes).max(axis=(0, 2), initial=0.0)
         size = float(np.abs(s).max())
-        inputs = self.pushed.summed(np.array([size]), most[None, None]).real[0, 0]
+        inputs = self.loads.sum_by_input(np.array([size]), most[None, None]).real[0, 0]
         outputs = [size**order * (np.abs(rows) @ sizes) for order, rows in self.rows.items()]
         return np.outer(np.sum(outputs, axis=0), inputs)
 
@@ -365,7 +378,7 @@ def _response(
 ) -> HarmonicResponse | Amplitudes:
     """Solver for amplitudes: elimination for a tree at rest, else from matrices."""
     state, loops = linear.state, linear.constrained_motion
-    if loops is not None or linear.rate_matrix is not None or linear.carrying is not None:
+    if loops is not None or linear.rate_matrix is not None or linear.frame_transform is not None:
         lost = None if loops is None or lossy is None else loops.matrices(lossy, state)
         return Amplitudes(linear.free_speed_indices, Matrices(linear.M, linear.C, linear.K), lost)
     return HarmonicResponse(

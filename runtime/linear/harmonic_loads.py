@@ -24,19 +24,19 @@ class HarmonicLoads:
     """Effort columns of harmonic inputs.
 
     Attributes:
-        pushes: (p,) inputs.
+        inputs: (p,) inputs.
         columns: (c, nu) efforts; a drive has several columns because it also moves its coordinate.
         powers: (c,) power of s that multiplies each column.
         parts: (c, p) assignment of columns to inputs.
     """
 
-    pushes: Sequence[Channel]
+    inputs: Sequence[Channel]
     columns: Array
     powers: NDArray[np.int64]
     parts: Array  # (c, p)
 
     @classmethod
-    def of(
+    def from_efforts(
         cls, linear: LinearEquations, pushes: Sequence[Channel], efforts: Array
     ) -> HarmonicLoads:
         """Columns from efforts (p, nu) of the inputs; for drives, of their accelerations."""
@@ -44,34 +44,34 @@ class HarmonicLoads:
         powers = [2 - one.drive if one.drive >= 0 else 0 for one in pushes]
         for j, one in enumerate(pushes):
             if one.drive >= 0:
-                moved = linear.drive_columns(one.moves)
-                columns += [-_placed(linear, x) for x in (moved.stiffness, moved.damping)]
+                moved = linear.drive_columns(one.drive_factors)
+                columns += [-_expand(linear, x) for x in (moved.stiffness, moved.damping)]
                 powers += [-one.drive, 1 - one.drive]
                 owners += [j, j]
         parts = np.eye(len(pushes))[owners]
         wide = np.reshape(columns, (len(columns), linear.model.nu))
         return cls(pushes, wide, np.array(powers, dtype=np.int64), parts)
 
-    def summed(self, s: Complex, answers: Complex) -> Complex:
+    def sum_by_input(self, s: Complex, answers: Complex) -> Complex:
         """Responses (k, outputs, p) to the inputs from responses (k, outputs, c) to the columns."""
-        if len(self.columns) == len(self.pushes) and not self.powers.any():
+        if len(self.columns) == len(self.inputs) and not self.powers.any():
             return answers
         return (answers * s[:, None, None] ** self.powers) @ self.parts
 
-    def carried(self, rows: Array) -> dict[int, tuple[int, Array]]:
+    def drive_contributions(self, rows: Array) -> dict[int, tuple[int, Array]]:
         """Direct contribution of the motion of drives to outputs.
 
         Maps the index of an input to a power of s and a column (outputs,).
         """
         found = {}
-        for j, one in enumerate(self.pushes):
-            if one.moves:
-                speeds, factors = zip(*one.moves, strict=True)
+        for j, one in enumerate(self.inputs):
+            if one.drive_factors:
+                speeds, factors = zip(*one.drive_factors, strict=True)
                 found[j] = -one.drive, rows[:, speeds] @ np.array(factors)
         return found
 
 
-def _placed(linear: LinearEquations, x: Array) -> Array:
+def _expand(linear: LinearEquations, x: Array) -> Array:
     """Vector (nu,) with the entries of x (n,) at the indices of its speeds."""
     found = np.zeros(linear.model.nu)
     found[list(linear.free_speed_indices)] = x

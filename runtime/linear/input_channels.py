@@ -31,7 +31,7 @@ from ..engine.tangent_matrix import TangentMatrix
 from ..packing.expression_tapes import constant_kernel
 from ..packing.scene_packing import packed_system
 from ..packing.system import LoadNumbers
-from .drive_inputs import Moves, accelerations, columns_of, followers, motions
+from .drive_inputs import DriveFactors, accelerations, drive_columns, followers, motions
 from .frozen_loads import INERTIAL
 from .mck_matrices import State
 
@@ -56,7 +56,7 @@ class Channel:
         input: index of an input of the scene, or -1.
         spring: index of a spring with an effort, or -1.
         drive: order of the time derivative of a motion of drives, or -1.
-        moves: drives that follow the channel, with factors.
+        drive_factors: drives that follow the channel, with factors.
     """
 
     name: str
@@ -68,10 +68,10 @@ class Channel:
     input: int = -1
     spring: int = -1
     drive: int = -1
-    moves: Moves = ()
+    drive_factors: DriveFactors = ()
 
 
-def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
+def require_names(what: str, names: Sequence[str]) -> Sequence[str]:
     """Validated list of names; SceneError for anything else."""
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise SceneError(f'{what} = {names!r}: expected a list of names, such as ["{names}"]')
@@ -82,7 +82,7 @@ def names_of(what: str, names: Sequence[str]) -> Sequence[str]:
 
 def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
     """Validated list of at least one name; SceneError for anything else."""
-    if not names_of(what, names):
+    if not require_names(what, names):
         raise SceneError(f"{what} is empty: leave it out, or name some")
     return names
 
@@ -92,10 +92,10 @@ def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tup
 
     Raises SceneError for other motions of drives.
     """
-    found = tuple(channel(model, name) for name in names_of(what, names))
+    found = tuple(channel(model, name) for name in require_names(what, names))
     for one in found:
         if 0 <= one.drive < 2:
-            instead = ", ".join(f'"{x}"' for x in accelerations(model, one.moves))
+            instead = ", ".join(f'"{x}"' for x in accelerations(model, one.drive_factors))
             raise SceneError(
                 f'"{one.name}": matrices take the acceleration of a drive, {instead}, for an '
                 "input, and make the rest states; frequency_response takes this one too"
@@ -125,14 +125,14 @@ def channel(model: CompiledScene, name: str) -> Channel:
     given = next((one for one in model.scene.input if one.name == name), None)
     if given is not None:
         if any(one.drive and name in one.inputs for one in active_expressions(model.scene)):
-            return _following(model, given)
+            return _drive_channel(model, given)
         return Channel(name, given.unit, input=model.coordinate_layout.inputs[name])
     if name in GROUND:
         return Channel(name, "m/s2", axis=_AXES.index(last))
     driven = motions(model)
     if name in driven:
         motion = driven[name]
-        return Channel(name, motion.unit, drive=motion.order, moves=((motion.speed, 1.0),))
+        return Channel(name, motion.unit, drive=motion.order, drive_factors=((motion.speed, 1.0),))
     ends = BodyReferences(model.scene.skeleton)
     if last.startswith("effort") and owner in model.coordinate_layout.hinges:
         return _effort(model, name, owner, last)
@@ -163,17 +163,19 @@ def channel(model: CompiledScene, name: str) -> Channel:
     )
 
 
-def _following(model: CompiledScene, given: Input) -> Channel:
+def _drive_channel(model: CompiledScene, given: Input) -> Channel:
     """Channel of an input that drives follow: the motion of these drives."""
     pushing = [
-        x.what for x in active_expressions(model.scene) if given.name in x.inputs and not x.drive
+        x.description
+        for x in active_expressions(model.scene)
+        if given.name in x.inputs and not x.drive
     ]
     if pushing:
         raise SceneError(
             f'"{given.name}": drives follow this input, and the {pushing[0]} reads it besides; '
             "give each an input of its own"
         )
-    return Channel(given.name, given.unit, drive=0, moves=followers(model, given.name, 0.0))
+    return Channel(given.name, given.unit, drive=0, drive_factors=followers(model, given.name, 0.0))
 
 
 def _effort(model: CompiledScene, name: str, hinge: str, last: str) -> Channel:
@@ -204,7 +206,7 @@ def columns(
         return np.zeros((len(free), 0))
     still, memory = np.zeros(engine.nu), engine.start_memory()
 
-    def beyond(of: LoopedEngine) -> Array:
+    def excess_efforts(of: LoopedEngine) -> Array:
         """Required efforts at rest in excess of those of the unloaded tree."""
         bare, loaded = (
             each.inverse_dynamics(state.t, state.q, still, still, memory)
@@ -219,15 +221,15 @@ def columns(
                 _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
             )
         elif one.drive >= 0:
-            found.append(-columns_of(engine, state, one.moves).inertia)
+            found.append(-drive_columns(engine, state, one.drive_factors).inertia)
         elif one.speed >= 0:
             found.append(np.eye(engine.nu)[one.speed])
         elif one.spring >= 0:
-            found.append(-beyond(_stretched(engine, one.spring)))
+            found.append(-excess_efforts(_with_unit_spring_effort(engine, one.spring)))
         elif one.end:
-            found.append(-beyond(_under(engine, one)))
+            found.append(-excess_efforts(_with_unit_load(engine, one)))
         else:
-            found.append(beyond(engine.unit_gravity[one.axis]))
+            found.append(excess_efforts(engine.unit_gravity[one.axis]))
     return np.array(found).T[free]
 
 
@@ -240,19 +242,19 @@ def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
         )
         for k, one in enumerate(system.inputs)
     ]
-    still = replace(system.held, places=(-1,) * len(inputs))
-    going = replace(system, inputs=tuple(inputs), held=still)
+    still = replace(system.held_inputs, memory_indices=(-1,) * len(inputs))
+    going = replace(system, inputs=tuple(inputs), held_inputs=still)
     tangent = TangentMatrix(LoopedEngine(packed_system(going, engine.packed)))
     tangent.residual(state.t, state.q, state.u, state.udot)
     nothing = np.zeros(engine.nu)
     return tangent.slope(1.0, np.zeros(engine.nq), nothing, nothing)
 
 
-def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
+def _with_unit_load(engine: LoopedEngine, push: Channel) -> LoopedEngine:
     """Engine of the tree with a unit load of the channel at an end as the only load."""
     packed = engine.packed
     body, _, offset = packed.end(push.end)
-    system = packed.system.awake(body)  # the end may have no other element
+    system = packed.system.with_active_body(body)  # the end may have no other element
     unit = np.eye(3)[push.axis].tolist()
     nothing, own = (-1, -1, -1), (0, 1, 2)
     force = push.kind == "force"
@@ -261,12 +263,12 @@ def _under(engine: LoopedEngine, push: Channel) -> LoopedEngine:
     )
     system = replace(
         system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(), loads=(load,),
-        values=constant_kernel("values", system, unit), drives=None, driven=(), moving={},
+        values=constant_kernel("values", system, unit), drives=None, driven=(), seeded_numbers={},
     )  # fmt: skip
     return LoopedEngine(packed_system(system, packed))
 
 
-def _stretched(engine: LoopedEngine, number: int) -> LoopedEngine:
+def _with_unit_spring_effort(engine: LoopedEngine, number: int) -> LoopedEngine:
     """Engine of the tree with a unit effort of one spring as the only load."""
     packed, system = engine.packed, engine.packed.system
     constant = constant_kernel("effort", system, [1.0])
@@ -275,6 +277,6 @@ def _stretched(engine: LoopedEngine, number: int) -> LoopedEngine:
     )
     system = replace(
         system, gravity=(0.0, 0.0, 0.0), laws=(), forces=(spring,), loads=(), values=None,
-        drives=None, driven=(), moving={},
+        drives=None, driven=(), seeded_numbers={},
     )  # fmt: skip
     return LoopedEngine(packed_system(system, packed))

@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from mstmm.argument_validation import require_texts
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer
+from mstmm.risk import AssessedResult
 
 from ..packing.coordinate_layout import check_dense_size
 from ..run.scene_system import SceneSystem
-from .drive_inputs import Columns, Moves, columns_of, coordinate
-from .frozen_loads import standing, with_frozen_springs, without_laws
+from .drive_inputs import Columns, DriveFactors, coordinate, drive_columns
+from .frozen_loads import with_frozen_loads, with_frozen_springs, without_laws
 from .input_channels import Channel, columns
 from .loops.constrained_linearisation import ConstrainedLinearisation
 from .matrix_operators import Pencil
 from .mck_matrices import Matrices, State, matrices
 from .operating_point.friction import DryFriction
-from .rotors.carrying import Carrying
+from .rotors.frame_transform import FrameTransform
 
 if TYPE_CHECKING:
     from ..engine.compiled_linearisation import CompiledState
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearEquations(AssessedAnswer):
+class LinearEquations(AssessedResult):
     """M x'' + C x' + K x = V v + W w for perturbations x about a state of a scene, SI units.
 
     x (n,) are tangent increments of the coordinates without prescribed motion: dq = N(q) x where
@@ -55,10 +55,10 @@ class LinearEquations(AssessedAnswer):
             for a tree.
         dry: friction of hinges that do not slide at the state, left out or replaced by viscous
             damping; None where the laws keep all friction.
-        carrying: transformation of the increments of a spinning rotor to the fixed frame; None
-            where x are increments of the coordinates themselves.
-        at_speeds: function that returns the equations at q with given speeds (nu,), if the
-            operating point was sought at rest because no state was given; else None.
+        frame_transform: transformation of the increments of a spinning rotor to the fixed frame;
+            None where x are increments of the coordinates themselves.
+        equations_at_speeds: function that returns the equations at q with given speeds (nu,), if
+            the operating point was sought at rest because no state was given; else None.
     """
 
     model: CompiledScene
@@ -69,8 +69,8 @@ class LinearEquations(AssessedAnswer):
     compiled_state: CompiledState | None = field(default=None, repr=False)
     constrained_motion: ConstrainedLinearisation | None = field(default=None, repr=False)
     dry: DryFriction | None = field(default=None, repr=False)
-    carrying: Carrying | None = field(default=None, repr=False)
-    at_speeds: Callable[[Array], LinearEquations] | None = field(default=None, repr=False)
+    frame_transform: FrameTransform | None = field(default=None, repr=False)
+    equations_at_speeds: Callable[[Array], LinearEquations] | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return (
@@ -87,7 +87,7 @@ class LinearEquations(AssessedAnswer):
         return (
             self.model.free_speed_indices
             if self.constrained_motion is None
-            else self.constrained_motion.places
+            else self.constrained_motion.independent_indices
         )
 
     @property
@@ -103,7 +103,7 @@ class LinearEquations(AssessedAnswer):
         return self.dry.engine(self.model)
 
     @cached_property
-    def _named(self) -> list[tuple[str, str]]:
+    def _names_and_units(self) -> list[tuple[str, str]]:
         """Names and units of x."""
         known = dict(zip(self.model.free_speed_indices, self.model.tangent_increments, strict=True))
         return [known[place] for place in self.free_speed_indices]
@@ -111,32 +111,34 @@ class LinearEquations(AssessedAnswer):
     @property
     def coordinate_names(self) -> tuple[str, ...]:
         """Names of x."""
-        return tuple(name for name, _ in self._named)
+        return tuple(name for name, _ in self._names_and_units)
 
     @property
     def coordinate_units(self) -> tuple[str, ...]:
         """Units of x."""
-        return tuple(unit for _, unit in self._named)
+        return tuple(unit for _, unit in self._names_and_units)
 
     # --- matrices ---------------------------------------------------------------------------------
 
     @cached_property
-    def _whole(self) -> Matrices:
+    def _full_matrices(self) -> Matrices:
         about = self.compiled_state
         if about is not None:
             return self._second_order(Matrices(about.M, about.C, about.K))
         check_dense_size(len(self), "the matrix of a linear model")
-        return self._second_order(self._of(self.open_tree))
+        return self._second_order(self._matrices_of(self.open_tree))
 
     @cached_property
-    def _held(self) -> Matrices:
-        return self._second_order(self._of(with_frozen_springs(self.open_tree, self.state)))
+    def _frozen_spring_matrices(self) -> Matrices:
+        return self._second_order(
+            self._matrices_of(with_frozen_springs(self.open_tree, self.state))
+        )
 
     @cached_property
-    def _standing(self) -> Matrices:
-        return self._second_order(self._of(standing(self.open_tree, self.state)))
+    def _frozen_load_matrices(self) -> Matrices:
+        return self._second_order(self._matrices_of(with_frozen_loads(self.open_tree, self.state)))
 
-    def _of(self, engine: LoopedEngine) -> Matrices:
+    def _matrices_of(self, engine: LoopedEngine) -> Matrices:
         """Matrices along x of the spanning tree, or of a variant with other elements."""
         if self.constrained_motion is not None:
             return self.constrained_motion.matrices(engine, self.state)
@@ -150,7 +152,7 @@ class LinearEquations(AssessedAnswer):
         g = self.rate_matrix
         if g is not None:
             found = Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
-        return found if self.carrying is None else self.carrying.matrices(found)
+        return found if self.frame_transform is None else self.frame_transform.matrices(found)
 
     @property
     def has_stiffness(self) -> bool:
@@ -160,22 +162,22 @@ class LinearEquations(AssessedAnswer):
     @property
     def M(self) -> Array:
         """Mass matrix (n, n)."""
-        return self._whole.M
+        return self._full_matrices.M
 
     @property
     def C(self) -> Array:
-        """Matrix (n, n) of x': `damping` + `gyroscopic`."""
-        return self._whole.C
+        """Matrix (n, n) of x': `damping` + `C_gyroscopic`."""
+        return self._full_matrices.C
 
     @property
     def K(self) -> Array:
-        """Stiffness matrix (n, n): `elastic` + `geometric` + `load`."""
-        return self._whole.K
+        """Stiffness matrix (n, n): `K_elastic` + `K_geometric` + `K_load`."""
+        return self._full_matrices.K
 
     @cached_property
     def C_damping(self) -> Array:
         """Damping part (n, n) of C: from laws, flexible bodies and loads."""
-        return self.C - self._standing.C + self._of_shapes(lambda body: body.D)
+        return self.C - self._frozen_load_matrices.C + self._modal_matrix(lambda body: body.D)
 
     @property
     def C_gyroscopic(self) -> Array:
@@ -185,18 +187,18 @@ class LinearEquations(AssessedAnswer):
     @cached_property
     def K_elastic(self) -> Array:
         """Elastic part (n, n) of K: from hinge laws, springs and flexible bodies."""
-        return self.K - self._held.K + self._of_shapes(lambda body: body.K)
+        return self.K - self._frozen_spring_matrices.K + self._modal_matrix(lambda body: body.K)
 
     @cached_property
     def K_springs(self) -> Array:
-        """Part (n, n) of `elastic` from springs between ends."""
-        lawless = self._second_order(self._of(without_laws(self.open_tree)))
-        return lawless.K - self._held.K
+        """Part (n, n) of `K_elastic` from springs between ends."""
+        lawless = self._second_order(self._matrices_of(without_laws(self.open_tree)))
+        return lawless.K - self._frozen_spring_matrices.K
 
     @property
     def K_load(self) -> Array:
         """Load stiffness (n, n) in K: from loads in body axes and loads by expressions."""
-        return self._held.K - self._standing.K
+        return self._frozen_spring_matrices.K - self._frozen_load_matrices.K
 
     @property
     def K_geometric(self) -> Array:
@@ -205,7 +207,7 @@ class LinearEquations(AssessedAnswer):
         It stems from gravity, inertia forces and constant loads and tensions on the displaced
         scene.
         """
-        return self._standing.K - self._of_shapes(lambda body: body.K)
+        return self._frozen_load_matrices.K - self._modal_matrix(lambda body: body.K)
 
     @property
     def input_names(self) -> tuple[str, ...]:
@@ -221,7 +223,9 @@ class LinearEquations(AssessedAnswer):
     def drive_indices(self) -> tuple[int, ...]:
         """Speed indices of the drives whose motions are inputs or disturbances."""
         moved = [
-            one.moves for one in (*self.input_channels, *self.disturbance_channels) if one.moves
+            one.drive_factors
+            for one in (*self.input_channels, *self.disturbance_channels)
+            if one.drive_factors
         ]
         return tuple(dict.fromkeys(speed for one in moved for speed, _ in one)) if moved else ()
 
@@ -231,9 +235,9 @@ class LinearEquations(AssessedAnswer):
         return tuple(coordinate(self.model, speed) for speed in self.drive_indices)
 
     @cached_property
-    def _moved(self) -> tuple[Array, Array]:
+    def _drive_matrices(self) -> tuple[Array, Array]:
         """Matrices K_driven and C_driven, each (n, drives)."""
-        if self.drive_indices and self.carrying is not None:
+        if self.drive_indices and self.frame_transform is not None:
             raise SceneError(
                 "fixed frame: motions of drives are not inputs there; leave them out, or push by "
                 "efforts and forces"
@@ -243,22 +247,22 @@ class LinearEquations(AssessedAnswer):
         wide = np.reshape(both, (len(found), 2, len(self)))
         return wide[:, 0].T, wide[:, 1].T
 
-    def drive_columns(self, moves: Moves) -> Columns:
+    def drive_columns(self, moves: DriveFactors) -> Columns:
         """Columns (n,) of drives that follow one common motion."""
         if self.constrained_motion is not None:
-            return self.constrained_motion.driven(self.state, moves)
-        wide = columns_of(self.model.looped, self.state, moves)
+            return self.constrained_motion.drive_columns(self.state, moves)
+        wide = drive_columns(self.model.looped, self.state, moves)
         return Columns(*(one[list(self.free_speed_indices)] for one in wide))
 
     @property
     def C_prescribed(self) -> Array:
         """Matrix (n, drives) of d' on the left-hand side."""
-        return self._moved[1]
+        return self._drive_matrices[1]
 
     @property
     def K_prescribed(self) -> Array:
         """Matrix (n, drives) of d on the left-hand side."""
-        return self._moved[0]
+        return self._drive_matrices[0]
 
     @cached_property
     def V(self) -> Array:
@@ -275,16 +279,20 @@ class LinearEquations(AssessedAnswer):
         if self.constrained_motion is None:
             found = columns(self.open_tree, self.state, channels, list(self.free_speed_indices))
         else:
-            found = self.constrained_motion.pushed(self.state, channels)
-        return found if self.carrying is None else self.carrying.pushed(found)
+            found = self.constrained_motion.input_matrix(self.state, channels)
+        return found if self.frame_transform is None else self.frame_transform.input_matrix(found)
 
-    def _of_shapes(self, matrix: Callable[..., Array]) -> Array:
+    def _modal_matrix(self, matrix: Callable[..., Array]) -> Array:
         """Matrix (n, n) assembled from a matrix of each flexible body."""
         found = np.zeros((self.model.nu, self.model.nu))
         for name, slots in self.model.coordinate_layout.modal.items():
             found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible_bodies[name])
         if self.constrained_motion is not None:
-            return self.constrained_motion.ways.T @ found @ self.constrained_motion.ways
+            return (
+                self.constrained_motion.motion_basis.T
+                @ found
+                @ self.constrained_motion.motion_basis
+            )
         return found[np.ix_(self.free_speed_indices, self.free_speed_indices)]
 
     def symbolic(self, keep: Sequence[str]) -> SymbolicLinearModel:
@@ -300,7 +308,7 @@ class LinearEquations(AssessedAnswer):
         Raises SceneError for unknown names, for parameters of flexible bodies, and for scenes and
         expressions that are too large.
         """
-        if self.carrying is not None:
+        if self.frame_transform is not None:
             raise SceneError(
                 "symbolic: linear models in the fixed frame are numbers; take M, C and K"
             )
@@ -320,10 +328,10 @@ class LinearEquations(AssessedAnswer):
 
     def expand(self, x: NDArray[Any]) -> NDArray[Any]:
         """Increments (nu, ...) along all speeds for x (n, ...)."""
-        if self.carrying is not None:
-            x = np.linalg.solve(self.carrying.turned, x)
+        if self.frame_transform is not None:
+            x = np.linalg.solve(self.frame_transform.rotation, x)
         if self.constrained_motion is not None:
-            return np.asarray(self.constrained_motion.ways @ x)
+            return np.asarray(self.constrained_motion.motion_basis @ x)
         found = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)
         found[list(self.free_speed_indices)] = x
         return found

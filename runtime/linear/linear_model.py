@@ -19,12 +19,12 @@ from mstmm.risk import Risk
 from ..packing.coordinate_layout import check_dense_size
 from .frequency_response import FrequencyResponse, frequency_response
 from .harmonic.dynamic_stiffness_modes import DynamicStiffnessModes, exact_modes
-from .harmonic.exact_beams import Chosen
+from .harmonic.exact_beams import BeamSelection
 from .harmonic.hysteretic_damping import Losses
 from .harmonic.modal_damping import Ratios
 from .mode_solvers import modes
 from .modes import Modes
-from .rotors.fixed_frame import carrying_at, frame_of
+from .rotors.fixed_frame import fixed_frame_transform, frame_of
 from .state_space import StateSpace
 from .validity import find_linear_risks
 
@@ -71,7 +71,7 @@ class Linear(StateSpace):
         """
         if self.frame == "fixed":
             return self
-        return replace(self, carrying=carrying_at(self))
+        return replace(self, frame_transform=fixed_frame_transform(self))
 
     @staticmethod
     def check_count(count: int | None, most: int) -> None:
@@ -93,7 +93,7 @@ class Linear(StateSpace):
         *,
         structural: Losses = 0.0,
         modal: Ratios = 0.0,
-        exact: Chosen = False,
+        exact: BeamSelection = False,
     ) -> FrequencyResponse:
         """Frequency response at angular frequencies omega (k,) in rad/s, O(bodies) per frequency.
 
@@ -120,7 +120,9 @@ class Linear(StateSpace):
         """
         return frequency_response(self, omega, inputs, outputs, structural, modal, exact)
 
-    def dynamic_stiffness_modes(self, count: int, exact: Chosen = True) -> DynamicStiffnessModes:
+    def dynamic_stiffness_modes(
+        self, count: int, exact: BeamSelection = True
+    ) -> DynamicStiffnessModes:
         """The `count` slowest undamped modes with exact beams.
 
         `exact` is as in `frequency_response`.  Modes are found by counting, so that none is missed.

@@ -27,14 +27,14 @@ _ROUNDING = 1e-7
 def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Modes:
     """Modes of a linear model; see `Linear.modes`."""
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
-    few = few and linear.constrained_motion is None and linear.carrying is None
+    few = few and linear.constrained_motion is None and linear.frame_transform is None
     if count is None or not few or linear.rate_matrix is not None:
         found = _dense(linear, damped)
         return found if count is None else replace(found.lowest(count), count=count)
-    return replace(_few(linear, count, damped), count=count)
+    return replace(_lowest_modes(linear, count, damped), count=count)
 
 
-def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
+def _lowest_modes(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
     from . import shift_invert_modes
 
     pencil = linear.operators
@@ -44,18 +44,18 @@ def _few(linear: LinearEquations, count: int, damped: bool | None) -> Modes:
         slowest = shift_invert_modes.damped_modes(pencil, count, with_c)
         return Modes(linear, slowest.values, slowest.shapes, None)
     slowest = shift_invert_modes.undamped_modes(pencil, count)
-    return _ordered(linear, slowest.values, slowest.shapes, slowest.is_complete)
+    return _modes_from_squares(linear, slowest.values, slowest.shapes, slowest.is_complete)
 
 
 def _dense(linear: LinearEquations, damped: bool | None) -> Modes:
     """All modes, from the matrices."""
     with_c = linear.C.any() if damped is None else damped
-    if with_c or not _from_potential(linear.K):
+    if with_c or not _is_symmetric(linear.K):
         return _general(linear, linear.C if with_c else np.zeros_like(linear.C))
-    return _ordered(linear, *_symmetric(linear), True)
+    return _modes_from_squares(linear, *_symmetric(linear), True)
 
 
-def _ordered(
+def _modes_from_squares(
     linear: LinearEquations, squares: Array, shapes: Array, complete: bool | None
 ) -> Modes:
     """Modes from omega^2; a negative value gives the growing one of its two motions."""
@@ -65,7 +65,7 @@ def _ordered(
     return Modes(linear, values[order], shapes[:, order], complete)
 
 
-def _from_potential(stiffness: Array) -> bool:
+def _is_symmetric(stiffness: Array) -> bool:
     scale = np.abs(stiffness).max(initial=0)
     return bool(np.abs(stiffness - stiffness.T).max(initial=0) <= _SYMMETRIC * scale)
 

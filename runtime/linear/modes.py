@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, Risk, information
+from mstmm.risk import AssessedResult, Risk, information
 from mstmm.safe_text import abbreviate_names
 
 from ..engine.characteristic_scales import scene_length
@@ -36,7 +36,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(AssessedAnswer):
+class Modes(AssessedResult):
     """k modes x(t) = Re(shape exp(eigenvalue t)) about an operating point, by ascending omega.
 
     Attributes:
@@ -152,7 +152,7 @@ class Modes(AssessedAnswer):
         """Modal masses (k,), x* M x, of the shapes."""
         linear, x = self.linear, self.shapes
         loops = linear.constrained_motion is not None
-        moved = linear.M @ x if loops else energy_shares.along(linear.operators.mass, x)
+        moved = linear.M @ x if loops else energy_shares.operator_products(linear.operators.mass, x)
         return np.real(np.einsum("ik,ik->k", np.conj(self.shapes), moved))
 
     @cached_property
@@ -192,7 +192,7 @@ class Modes(AssessedAnswer):
         Owners are hinges with laws, flexible bodies, and "springs" for all springs together, if
         there are any.  nan for a shape without elastic energy.
         """
-        return energy_shares.strain(self.linear, self.shapes)
+        return energy_shares.strain_shares(self.linear, self.shapes)
 
     def displaced_state(self, k: int, amplitude: float) -> Array:
         """Coordinates q (nq,) of the state displaced by `amplitude` times Re(shape k)."""
@@ -294,10 +294,10 @@ class Modes(AssessedAnswer):
         """
         from .plots.mode_shapes import shapes
 
-        which = self._which(which)
+        which = self._shape_indices(which)
         return shapes(self.linear, self.eigenvalues, self.shapes, which, path)
 
-    def _which(self, which: Sequence[int] | None) -> Sequence[int]:
+    def _shape_indices(self, which: Sequence[int] | None) -> Sequence[int]:
         """Indices of the requested shapes, by default the first; SceneError for an unknown one."""
         if which is None:
             return range(min(_PANELS, len(self)))
@@ -331,7 +331,7 @@ class Modes(AssessedAnswer):
             raise SceneError(f"amplitude = {amplitude:g}: expected a part of the size, 0 to 1")
         if which is None:
             which = np.flatnonzero(self.omega > 0)[:_PANELS].tolist() or None
-        which = self._which(which)
+        which = self._shape_indices(which)
         made = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
         if path is not None:
             made.save(path)

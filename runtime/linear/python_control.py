@@ -11,7 +11,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import SceneError
 from mstmm.optional_packages import missing_package_error
 
-from .harmonic.steady_states import refuse_turning_outputs
+from .harmonic.steady_states import check_steady_outputs
 from .input_channels import Channel, some_names
 from .outputs.linear_outputs import outputs_of, rows_of
 from .state_space import StateSpace
@@ -26,8 +26,8 @@ def output_matrices(
     """
     named = None if outputs is None else some_names("outputs", outputs)
     shown = outputs_of(linear, named)
-    refuse_turning_outputs(linear, shown)
-    c, d = linear.observed(rows_of(linear, shown, pushes), b)
+    check_steady_outputs(linear, shown)
+    c, d = linear.state_output_matrices(rows_of(linear, shown, pushes), b)
     return tuple(one.name for one in shown), c, d
 
 

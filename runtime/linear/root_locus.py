@@ -19,9 +19,9 @@ from scipy.optimize import linear_sum_assignment
 from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array, Integers, finite_array
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import RUN, AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import RUN, AssessedResult, DeferredRisks, Risk
 
-from ..risk_checks.answers import merge_over_values
+from ..risk_checks.state_risks import merge_over_values
 from . import file_formats
 from .modes import Complex, Modes
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from .linear_model import Linear
 
 #: Function that returns the linear model at a parameter value.
-At = Callable[[float], "Linear"]
+ModelAtValue = Callable[[float], "Linear"]
 
 #: Accepted values of `frame` in `Model.locus`.
 FRAMES = ("auto", "fixed", "rotating")
@@ -42,7 +42,7 @@ _ALIKE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
-class RootLocus(AssessedAnswer):
+class RootLocus(AssessedResult):
     """Eigenvalues over a parameter.
 
     Attributes:
@@ -131,10 +131,15 @@ class RootLocus(AssessedAnswer):
 
 
 def trace_modes(
-    at: At, parameter: str, values: Array, count: int | None, damped: bool | None, frame: str
+    at: ModelAtValue,
+    parameter: str,
+    values: Array,
+    count: int | None,
+    damped: bool | None,
+    frame: str,
 ) -> RootLocus:
     """Modes at each parameter value, paired in columns; `frame` as in `Model.locus`."""
-    models, risks = _framed([at(value) for value in values.tolist()], parameter, frame)
+    models, risks = _in_frame([at(value) for value in values.tolist()], parameter, frame)
     found = [linear.modes(count, damped) for linear in models]
     width = max(len(one) for one in found)
     if not width:
@@ -144,7 +149,7 @@ def trace_modes(
     order: Integers = np.arange(len(found[0]))
     rows[0, order], turns[0, order] = found[0].eigenvalues, found[0].whirl
     for row, (before, now) in enumerate(pairwise(found), start=1):
-        order = _paired(before, now, order, width)
+        order = _pair_modes(before, now, order, width)
         rows[row, order], turns[row, order] = now.eigenvalues, now.whirl
     rotating = any(one.frame == "rotating" for one in found)
     frame = "rotating" if rotating else "fixed"
@@ -155,7 +160,7 @@ def trace_modes(
     return RootLocus(parameter, values, rows, frame, turns, findings)
 
 
-def _framed(
+def _in_frame(
     models: list[Linear], parameter: str, frame: str
 ) -> tuple[list[Linear], tuple[Risk, ...]]:
     """Models in the requested frame, with a risk if "auto" cannot use the fixed frame."""
@@ -168,10 +173,10 @@ def _framed(
     except SceneError as error:
         if frame == "fixed":
             raise
-        return models, (_rotating(parameter, str(error)),)
+        return models, (_rotating_frame_risk(parameter, str(error)),)
 
 
-def _rotating(parameter: str, why: str) -> Risk:
+def _rotating_frame_risk(parameter: str, why: str) -> Risk:
     return Risk(
         "rotating-frame", parameter,
         f"frequencies are those of the rotating frame, of which critical speeds cannot be read off "
@@ -180,7 +185,7 @@ def _rotating(parameter: str, why: str) -> Risk:
     )  # fmt: skip
 
 
-def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
+def _pair_modes(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
     """Column of each mode: that of the most similar mode at the previous value."""
     apart = np.abs(before.eigenvalues[:, None] - now.eigenvalues[None, :])
     apart /= np.maximum(1e-300, np.maximum(before.omega[:, None], now.omega[None, :]))
@@ -194,7 +199,7 @@ def _paired(before: Modes, now: Modes, order: Integers, width: int) -> Integers:
 
 
 @dataclass(frozen=True)
-class StabilityLimit(AssessedAnswer):
+class StabilityLimit(AssessedResult):
     """Parameter value at the stability limit, beyond which a mode is unstable.
 
     Attributes:
@@ -214,7 +219,7 @@ class StabilityLimit(AssessedAnswer):
     frame: str = "fixed"
 
 
-def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
+def critical(at: ModelAtValue, parameter: str, low: float, high: float) -> StabilityLimit:
     """Stability limit between a stable value `low` and an unstable value `high`, by bisection.
 
     One of several limits between them is found.
@@ -222,12 +227,12 @@ def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
     Raises SceneError if `low` is unstable or `high` is stable.
     """
     first, last = _modes_at(at, low), _modes_at(at, high)
-    if first is None or _growing(first) is not None:
+    if first is None or _most_unstable_mode(first) is not None:
         raise SceneError(
             f"{parameter} = {low:g}: a motion grows there already; expected a value at which the "
             "scene is stable"
         )
-    if last is not None and _growing(last) is None:
+    if last is not None and _most_unstable_mode(last) is None:
         raise SceneError(
             f"{parameter} = {high:g}: no motion grows there; expected a value beyond the critical"
         )
@@ -237,11 +242,11 @@ def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
         if middle in (low, high):
             break
         found = _modes_at(at, middle)
-        if found is not None and _growing(found) is None:
+        if found is not None and _most_unstable_mode(found) is None:
             low, below = middle, found
         else:
             high, last = middle, found
-    growing = None if last is None else _growing(last)
+    growing = None if last is None else _most_unstable_mode(last)
     value, names = (0j, ()) if last is None or growing is None else (
         complex(last.eigenvalues[growing]), tuple(last.dominant_coordinates(growing))
     )  # fmt: skip
@@ -254,10 +259,10 @@ def critical(at: At, parameter: str, low: float, high: float) -> StabilityLimit:
     )  # fmt: skip
 
 
-def _modes_at(at: At, value: float) -> Modes | None:
+def _modes_at(at: ModelAtValue, value: float) -> Modes | None:
     """All modes at a parameter value; None where the scene has no equilibrium."""
     try:
-        (linear,), _ = _framed([at(value)], "", "auto")
+        (linear,), _ = _in_frame([at(value)], "", "auto")
         modes = linear.modes()
     except NumericalFailure:
         return None
@@ -266,7 +271,7 @@ def _modes_at(at: At, value: float) -> Modes | None:
     return modes
 
 
-def _growing(modes: Modes) -> int | None:
+def _most_unstable_mode(modes: Modes) -> int | None:
     """Index of the mode with the largest growth rate; None if no mode is unstable."""
     k = int(modes.eigenvalues.real.argmax())
     return k if modes.eigenvalues[k].real > 0 else None

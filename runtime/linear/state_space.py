@@ -54,7 +54,7 @@ class StateSpace(LinearEquations):
     @property
     def _undriven(self) -> Array:
         """System matrix (2 n, 2 n) of (x, x') without motion of drives."""
-        if self.compiled_state is not None and self.carrying is None:
+        if self.compiled_state is not None and self.frame_transform is None:
             found = self.model.compiled_linearisation.state_matrix(
                 self.compiled_state, self.rate_matrix is not None
             )
@@ -67,20 +67,20 @@ class StateSpace(LinearEquations):
     @cached_property
     def B(self) -> Array:
         """Input matrix (2 n + 2 k, inputs)."""
-        return self._pushing(self.input_channels, self.V)
+        return self._input_columns(self.input_channels, self.V)
 
     @cached_property
     def B_disturbances(self) -> Array:
         """Input matrix (2 n + 2 k, disturbances) of w."""
-        return self._pushing(self.disturbance_channels, self.W)
+        return self._input_columns(self.disturbance_channels, self.W)
 
-    def observed(self, rows: Rows, b: Array) -> tuple[Array, Array]:
+    def state_output_matrices(self, rows: Rows, b: Array) -> tuple[Array, Array]:
         """C (outputs, states) and D (outputs, pushes) of output rows.
 
         `b` (states, pushes) is the input matrix of d/dt z.
         """
         speeds, rates = [*self.free_speed_indices, *self.drive_indices], self.velocity_states
-        c, d = np.zeros((len(rows.through), len(self.state_names))), rows.through
+        c, d = np.zeros((len(rows.feedthrough), len(self.state_names))), rows.feedthrough
         for order, wide in rows.orders.items():
             some = wide[:, speeds]
             if order < 2:
@@ -89,11 +89,11 @@ class StateSpace(LinearEquations):
                 c, d = c + some @ self.A[rates], d + some @ b[rates]
         return c, d
 
-    def _pushing(self, pushes: Sequence[Channel], efforts: Array) -> Array:
+    def _input_columns(self, pushes: Sequence[Channel], efforts: Array) -> Array:
         found = np.zeros((len(self.state_names), len(pushes)))
         n, k = len(self), len(self.drive_indices)
         found[n : 2 * n] = np.linalg.solve(self.M, efforts)
         for j, one in enumerate(pushes):
-            for speed, factor in one.moves:
+            for speed, factor in one.drive_factors:
                 found[2 * n + k + self.drive_indices.index(speed), j] = factor
         return found

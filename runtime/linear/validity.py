@@ -12,16 +12,16 @@ from mstmm.array_validation import Array
 from mstmm.risk import RUN, Risk, information
 from mstmm.safe_text import abbreviate_names
 
-from ..risk_checks.answers import find_state_risks
+from ..risk_checks.state_risks import find_state_risks
 from .input_channels import GROUND, Channel
 from .mode_solvers import modes
 from .modes import INPUT_RISKS, OUTPUT_LEFT_OUT
 from .operating_point.changes import MATRICES, find_changes
 from .operating_point.departure import LARGEST, Departure, find_departure
-from .operating_point.later import LaterStates
-from .operating_point.starting import find_start_risks
-from .operating_point.sticking import friction_risks, saturation_risks, ways_of
-from .outputs.linear_outputs import left_out
+from .operating_point.friction_risks import friction_risks, independent_motions, saturation_risks
+from .operating_point.initial_speeds import find_start_risks
+from .operating_point.later_states import LaterStates
+from .outputs.linear_outputs import unavailable_outputs
 from .rotors.blades import find_blades
 
 if TYPE_CHECKING:
@@ -41,10 +41,12 @@ def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
     yield from unsteady
     if len(linear) <= LARGEST:
         yield from friction_risks(linear)
-    yield from saturation_risks(linear, ways_of(linear))
+    yield from saturation_risks(linear, independent_motions(linear))
     yield from find_start_risks(linear, _ALL_MOTIONS)
     changing = {risk.element for risk in unsteady}
-    yield from (one for one in without_effect(linear, linear.V) if one.element not in changing)
+    yield from (
+        one for one in ineffective_input_risks(linear, linear.V) if one.element not in changing
+    )
     yield from find_omissions(linear)
     if len(linear) <= _ALL_MOTIONS:
         yield from modes(linear, None, None).motion_risks()
@@ -67,7 +69,7 @@ def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
             "stand still at the values of the scene",
             "close the loop by the inputs of this model",
         )
-    for name, why in left_out(linear):
+    for name, why in unavailable_outputs(linear):
         yield information(
             "output-left-out", f'output "{name}"', f"output {name} is not among the outputs: {why}",
             "name an output that has a linear form",
@@ -102,7 +104,7 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
     if leaving is not None:
         yield departure_risk(linear.state.t, leaving, later.cause)
     if len(linear) > LARGEST:
-        if later.sparse:
+        if later.compared_states:
             yield information(
                 "stability-unknown", RUN,
                 f"more than {LARGEST} coordinates: not examined for matrices that change along "
@@ -152,7 +154,7 @@ def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
     )  # fmt: skip
 
 
-def without_effect(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
+def ineffective_input_risks(linear: LinearEquations, effects: Array) -> Iterator[Risk]:
     """Risks of inputs whose columns in `effects` (n, inputs) are zero."""
     for name, column in zip(linear.input_names, effects.T, strict=True):
         if len(linear) and not column.any():
@@ -166,10 +168,10 @@ def is_unsteady(linear: LinearEquations) -> bool:
     """Whether closed loops are at an unsteady state, so that accelerations rotate rows."""
     if linear.constrained_motion is None or find_departure(linear) is None:
         return False
-    return not _balanced(linear, linear.constrained_motion.ways)
+    return not _is_balanced(linear, linear.constrained_motion.motion_basis)
 
 
-def _balanced(linear: LinearEquations, ways: Array) -> bool:
+def _is_balanced(linear: LinearEquations, ways: Array) -> bool:
     """Whether efforts along the independent motions of a mechanism are rounding errors.
 
     They are relative to the efforts that cancel.  Rounding may still move weakly constrained

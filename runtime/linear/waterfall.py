@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
-from ..risk_checks.answers import merge_over_values
+from ..risk_checks.state_risks import merge_over_values
 from . import file_formats
 from .frequency_response import frequency_response
 from .modes import Complex
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Waterfall(AssessedAnswer):
+class Waterfall(AssessedResult):
     """Frequency response of one output to one input, over a parameter and frequency.
 
     Attributes:

@@ -16,7 +16,7 @@ from mstmm.errors import NumericalFailure, SceneError
 
 from ..engine.compiled_scene import CompiledScene
 from ..engine.loops.independent_speeds import IndependentSpeeds
-from ..linear.input_channels import channel, names_of
+from ..linear.input_channels import channel, require_names
 from ..packing.coordinate_layout import check_dense_size
 
 #: Largest deviation of given accelerations from closed loops, relative to the largest one.
@@ -28,9 +28,9 @@ _MIN_SHARE = 1e-7
 def reduced_mass(model: CompiledScene, q: Array) -> Array:
     """Mass matrix N^T M N (n, n) of the independent speeds at q (nq,)."""
     assert model.independent_speeds is not None
-    check_dense_size(len(model.independent_speeds.places), "the mass matrix")
-    motions = model.independent_speeds.following(q, model.independent_speeds.places)
-    matrix = model.looped.required_by_inertia(q, motions.T) @ motions
+    check_dense_size(len(model.independent_speeds.indices), "the mass matrix")
+    motions = model.independent_speeds.motion_matrix(q, model.independent_speeds.indices)
+    matrix = model.looped.mass_matrix_product(q, motions.T) @ motions
     return np.asarray((matrix + matrix.T) / 2)
 
 
@@ -44,7 +44,7 @@ def constrained_inverse_dynamics(
 ) -> Array:
     """Efforts (..., nu) of a mechanism; see `Model.inverse_dynamics`."""
     assert model.independent_speeds is not None
-    nu, places = model.nu, model.independent_speeds.places
+    nu, places = model.nu, model.independent_speeds.indices
     actuator_speeds = list(places) if actuators is None else _actuator_speeds(model, actuators)
     is_reduced = np.ndim(udot) > 0 and np.shape(udot)[-1] == len(places) != nu
     if np.ndim(udot) > 0 and np.shape(udot)[-1] not in (nu, len(places)):
@@ -66,7 +66,7 @@ def constrained_inverse_dynamics(
 def _actuator_speeds(model: CompiledScene, names: Sequence[str]) -> list[int]:
     """Indices of the actuated speeds; raises SceneError unless their number is the mobility."""
     speeds = list[int]()
-    for name in names_of("actuators", names):
+    for name in require_names("actuators", names):
         slots = model.coordinate_layout.hinges.get(name)
         if slots is not None:
             hinge_speeds = range(slots.u, slots.u + slots.nu)
@@ -75,7 +75,7 @@ def _actuator_speeds(model: CompiledScene, names: Sequence[str]) -> list[int]:
             speeds.append(_effort_speed(model, name))
     count, mobility = (
         len(set(speeds)),
-        len(model.independent_speeds.places) if model.independent_speeds else 0,
+        len(model.independent_speeds.indices) if model.independent_speeds else 0,
     )
     if count != mobility:
         raise SceneError(
@@ -86,7 +86,7 @@ def _actuator_speeds(model: CompiledScene, names: Sequence[str]) -> list[int]:
 
 
 def _independent_names(model: CompiledScene) -> str:
-    places = model.independent_speeds.places if model.independent_speeds else ()
+    places = model.independent_speeds.indices if model.independent_speeds else ()
     return ", ".join(map(model.coordinate_layout.u_name, places))
 
 
@@ -105,15 +105,15 @@ def _efforts(
     """Efforts (nu,) of a mechanism at one state."""
     engine, freedom = model.looped, model.independent_speeds
     assert freedom is not None
-    places, memory = list(freedom.places), engine.start_memory()
-    motions = freedom.following(q, places)
+    places, memory = list(freedom.indices), engine.start_memory()
+    motions = freedom.motion_matrix(q, places)
     free_rates = engine.accelerations(t, q[None].copy(), u[None].copy(), memory[None])[1][0]
     target = rates if len(rates) == len(places) else rates[places]
     a = free_rates + motions @ (target - free_rates[places])
     if len(rates) != len(places):
         _check_closed(model, rates, a)
     tree_efforts = engine.inverse_dynamics(t, q, u, a, memory)
-    if not _moves_all(freedom, motions, actuator_speeds):
+    if not _can_drive_all(freedom, motions, actuator_speeds):
         names = ", ".join(model.coordinate_layout.u_name(k) for k in actuator_speeds)
         raise NumericalFailure(
             f"actuators: at this state efforts along {names} cannot drive all motions of the "
@@ -122,14 +122,14 @@ def _efforts(
     efforts = np.zeros(engine.nu)
     efforts[actuator_speeds] = np.linalg.solve(motions[actuator_speeds].T, motions.T @ tree_efforts)
     for speed in sorted({*range(engine.nu)} - {*model.free_speed_indices}):
-        efforts[speed] = freedom.driving(q, speed) @ (tree_efforts - efforts)
+        efforts[speed] = freedom.prescribed_motion(q, speed) @ (tree_efforts - efforts)
     return efforts
 
 
-def _moves_all(freedom: IndependentSpeeds, motions: Array, actuator_speeds: list[int]) -> bool:
+def _can_drive_all(freedom: IndependentSpeeds, motions: Array, actuator_speeds: list[int]) -> bool:
     """Whether efforts along the actuated speeds can drive all motions of a mechanism."""
     scales = freedom.sizes
-    scaled = motions * scales[list(freedom.places)] / scales[:, None]
+    scaled = motions * scales[list(freedom.indices)] / scales[:, None]
     smallest = np.linalg.svd(scaled[actuator_speeds], compute_uv=False).min(initial=np.inf)
     return bool(smallest > _MIN_SHARE * np.abs(scaled).max(initial=0.0))
 

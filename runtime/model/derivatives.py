@@ -102,7 +102,7 @@ class Differentiation:
             packed = model.packed_scene
             structure, self.p = structure_of(packed.system, known, floors=packed.floors)
             self.slopes = np.zeros((len(self.p), 0))
-        self._live = LiveInputs(model.packed_scene.system, structure.inputs)
+        self._live_inputs = LiveInputs(model.packed_scene.system, structure.inputs)
         self.tangents = TangentKernels(model.fusion, structure, bool(names))
         self._memory = np.zeros(structure.n_memory)
         #: Without drives all speeds are free, and coordinates do not depend on time.
@@ -131,7 +131,7 @@ class Differentiation:
             ("efforts", np.zeros(nu) if efforts is None else efforts, nu),
         )  # fmt: skip
         udot = accelerations()
-        arrays = self.at(times[:, None], coordinates, speeds, extra)
+        arrays = self.evaluate(times[:, None], coordinates, speeds, extra)
 
         def reshape(name: str, *shape: int) -> Array:
             return arrays[name].reshape(*lead, *shape)
@@ -149,7 +149,7 @@ class Differentiation:
 
         None without such code, or if it fails: forward mode then reports the reason.
         """
-        call = self._model.compiled_linearisation.call(_SINGLE_SAVING)
+        call = self._model.compiled_linearisation.thread_call(_SINGLE_SAVING)
         arrays = None if call is None else call.derivatives(t, q, u)
         if arrays is None:
             return None
@@ -160,9 +160,9 @@ class Differentiation:
     def _by_linear_equations(
         self, t: Array, q: Array, u: Array, efforts: Array
     ) -> dict[str, Array] | None:
-        """`at` by the code of the linear equations; None without it."""
+        """`evaluate` by the code of the linear equations; None without it."""
         call = (
-            self._model.compiled_linearisation.call(_SINGLE_SAVING * len(q))
+            self._model.compiled_linearisation.thread_call(_SINGLE_SAVING * len(q))
             if self._undriven
             else None
         )
@@ -171,7 +171,7 @@ class Differentiation:
         n = self._model.nu
         slopes, rate_matrices = np.empty((len(q), n, 3 * n + 1)), np.empty((len(q), n, n))
         for k, state in enumerate(zip(t[:, 0].tolist(), q, u, efforts, strict=True)):
-            equations = call.with_slopes(*state)
+            equations = call.evaluate_with_derivatives(*state)
             if equations is None:
                 return None
             slopes[k], rate_matrices[k] = equations[1], equations[0].G
@@ -181,7 +181,7 @@ class Differentiation:
             "rate_u": np.repeat(self._units[None], len(q), axis=0),
         }  # fmt: skip
 
-    def at(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
+    def evaluate(self, t: Array, q: Array, u: Array, efforts: Array) -> dict[str, Array]:
         """Derivatives (n, row, column) at n states, by the names of `Derivatives`.
 
         t (n, 1), q (n, nq), u and efforts (n, nu); parameters are columns of one array.
@@ -191,8 +191,8 @@ class Differentiation:
             return at_once
         nu = self._model.nu
         states = {
-            "p": np.atleast_2d(self._live.at(self.p, t[:, 0])), "t": t, "q": q, "u": u,
-            "memory": self._memory[None], "efforts": efforts,
+            "p": np.atleast_2d(self._live_inputs.numbers_at(self.p, t[:, 0])), "t": t, "q": q,
+            "u": u, "memory": self._memory[None], "efforts": efforts,
         }  # fmt: skip
         self.tangents.expect(len(q) * (4 * nu + 1 + len(self.names)))
         units, columns = np.eye(nu)[None], self.tangents.columns
@@ -211,11 +211,11 @@ class Differentiation:
         arrays["rate_q"], arrays["rate_u"] = self._rates(states, increments)
         return arrays
 
-    def turning(self, q: Array, u: Array, t: float = 0.0) -> Array:
+    def rate_matrix(self, q: Array, u: Array, t: float = 0.0) -> Array:
         """`rate_q` (nu, nu) of one state."""
         states = {
-            "p": np.atleast_2d(self._live.at(self.p, np.array([t]))), "t": np.array([[t]]),
-            "q": q[None], "u": u[None], "memory": self._memory[None],
+            "p": np.atleast_2d(self._live_inputs.numbers_at(self.p, np.array([t]))),
+            "t": np.array([[t]]), "q": q[None], "u": u[None], "memory": self._memory[None],
             "efforts": np.zeros((1, self._model.nu)),
         }  # fmt: skip
         increments = self.tangents.columns("u", "qdot", states, np.eye(self._model.nu)[None])

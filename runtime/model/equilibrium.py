@@ -9,14 +9,17 @@ import numpy as np
 
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 from mstmm.safe_text import abbreviate_names
 
 from ..engine.characteristic_scales import scene_length, speed_scales
 from ..engine.engine_calls import Probe
-from ..engine.statics.rest import Undetermined, Unsettled
-from ..engine.statics.rest_by_sweep import MAX_STEPS
-from ..risk_checks.answers import find_state_risks
+from ..engine.statics.pseudo_transient_equilibrium import MAX_STEPS
+from ..engine.statics.static_equilibrium import (
+    EquilibriumNotFoundError,
+    UndeterminedEquilibriumError,
+)
+from ..risk_checks.state_risks import find_state_risks
 from ..run.scene_system import SceneSystem
 from .equilibrium_search import MAX_INDEPENDENT, EquilibriumSearch, Progress
 from .full_turns import remove_full_turns
@@ -36,7 +39,7 @@ _MAX_SPIN_MOTION = 5e-2
 _AXES = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class Equilibrium(AssessedAnswer, np.ndarray[Any, np.dtype[np.float64]]):
+class Equilibrium(AssessedResult, np.ndarray[Any, np.dtype[np.float64]]):
     """Array q (nq,) of an equilibrium with residuals, instabilities and findings.
 
     `residuals` are the remaining efforts in N or N*m (of modal coordinates N, or N*m for twist) by
@@ -68,15 +71,15 @@ def equilibrium(
     search = EquilibriumSearch(model, t)
     try:
         rest, stability = search.find(q, tolerance, max_steps, progress)
-    except Undetermined as failure:
+    except UndeterminedEquilibriumError as failure:
         raise _undetermined_error(
-            [name(failure.problem.places[k]) for k in failure.places]
+            [name(failure.problem.coordinate_indices[k]) for k in failure.coordinate_indices]
         ) from None
     except NumericalFailure as failure:
         unbalanced = search.find_unbalanced(q)
         if unbalanced is not None:
             raise _unbalanced_error(model, q, *unbalanced) from None
-        if not isinstance(failure, Unsettled):
+        if not isinstance(failure, EquilibriumNotFoundError):
             raise
         efforts = _list_largest_efforts(model, failure)
         raise NumericalFailure(
@@ -144,7 +147,11 @@ def _moving_speeds(model: CompiledScene, q: Array, motions: list[Array]) -> tupl
     """
     moving, sizes = np.zeros(model.nu, dtype=bool), speed_scales(model)
     places = np.arange(model.nu)
-    if motions and model.closed is not None and model.closed.loops.mobility <= MAX_INDEPENDENT:
+    if (
+        motions
+        and model.loop_start is not None
+        and model.loop_start.loops.mobility <= MAX_INDEPENDENT
+    ):
         assert model.independent_speeds is not None
         places = np.array(model.independent_speeds.select(q))
     for motion in motions:
@@ -192,10 +199,10 @@ def _apply_drives(model: CompiledScene, q: Array, t: float) -> Array:
     return SceneSystem(model.looped).start(t, q, np.zeros(model.nu))[: model.nq]
 
 
-def _list_largest_efforts(model: CompiledScene, failure: Unsettled) -> str:
+def _list_largest_efforts(model: CompiledScene, failure: EquilibriumNotFoundError) -> str:
     """Text of the largest efforts by name, ranked by work over a characteristic motion."""
     problem, residual = failure.problem, failure.residual
-    places = range(model.nu) if problem is None else problem.places
+    places = range(model.nu) if problem is None else problem.coordinate_indices
     sizes = speed_scales(model)[list(places)]
     order = np.argsort(-np.abs(residual * sizes))[:_MAX_LISTED]
     names = [model.coordinate_layout.u_name(places[k]) for k in order]

@@ -16,7 +16,7 @@ from .state_dynamics import DynamicsQueries
 if TYPE_CHECKING:
     from ..linear.frequency_response import FrequencyResponse
     from ..linear.harmonic.dynamic_stiffness_modes import DynamicStiffnessModes
-    from ..linear.harmonic.exact_beams import Chosen
+    from ..linear.harmonic.exact_beams import BeamSelection
     from ..linear.harmonic.hysteretic_damping import Losses
     from ..linear.harmonic.modal_damping import Ratios
     from ..linear.linear_model import Linear
@@ -95,7 +95,7 @@ class LinearAnalysis(DynamicsQueries):
     def dynamic_stiffness_modes(
         self,
         count: int,
-        exact: Chosen = True,
+        exact: BeamSelection = True,
         q: ArrayLike | None = None,
         t: float = 0.0,
     ) -> DynamicStiffnessModes:
@@ -115,7 +115,7 @@ class LinearAnalysis(DynamicsQueries):
         *,
         structural: Losses = 0.0,
         modal: Ratios = 0.0,
-        exact: Chosen = False,
+        exact: BeamSelection = False,
         friction: Amplitudes = None,
         u: ArrayLike | None = None,
     ) -> FrequencyResponse:

@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 class Model(LinearAnalysis, NotebookDisplay):
     """Compiled scene; created by `mstmm.compile`.
 
-    `q` and `u` hold the hinges in the scene's order (`layout`); SI units and radians; speeds and
-    quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
+    `q` and `u` hold the hinges in the scene's order (`coordinate_layout`); SI units and radians;
+    speeds and quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
     """
 
     def __repr__(self) -> str:
@@ -50,7 +50,11 @@ class Model(LinearAnalysis, NotebookDisplay):
     @property
     def _mobility(self) -> int:
         """Number of degrees of freedom: free speeds, less those that loops constrain."""
-        return len(self.free_speed_indices) if self.closed is None else self.closed.loops.mobility
+        return (
+            len(self.free_speed_indices)
+            if self.loop_start is None
+            else self.loop_start.loops.mobility
+        )
 
     def initial_state(self) -> tuple[Array, Array]:
         """Initial state (q, u) of the scene at t = 0, with driven coordinates."""
@@ -69,22 +73,22 @@ class Model(LinearAnalysis, NotebookDisplay):
         """Closed-loop analysis: cut hinges, constraint rows, redundant rows, mobility."""
         from ..engine.loops.loop_analysis import LoopAnalysis
 
-        if self.closed is None:
+        if self.loop_start is None:
             return LoopAnalysis()
         return replace(
-            self.closed.loops,
+            self.loop_start.loops,
             speed_choice=self._independent_speed_names,
-            found_by=self._find_branches,
+            find_branches=self._find_branches,
         )
 
     def _find_branches(self) -> tuple[Branch, ...]:
-        assert self.closed is not None
-        return self.closed.branches
+        assert self.loop_start is not None
+        return self.loop_start.branches
 
     def _independent_speed_names(self) -> tuple[str, ...]:
         assert self.independent_speeds is not None
         return tuple(
-            self.coordinate_layout.u_name(place) for place in self.independent_speeds.places
+            self.coordinate_layout.u_name(place) for place in self.independent_speeds.indices
         )
 
     def assemble(
@@ -114,7 +118,9 @@ class Model(LinearAnalysis, NotebookDisplay):
         initial, remedy = self.initial_state(), "assemble takes one state; see assemble_path"
         target_q = initial[0] if q is None else single_state("q", q, self.nq, remedy)
         target_u = initial[1] if u is None else single_state("u", u, self.nu, remedy)
-        moving_hinges = self.closed.fast if u is None and self.closed is not None else None
+        moving_hinges = (
+            self.loop_start.fast_hinges if u is None and self.loop_start is not None else None
+        )
         return assemble(
             self,
             target_q,
@@ -141,9 +147,9 @@ class Model(LinearAnalysis, NotebookDisplay):
 
     def check_start_determined(self) -> None:
         """Raise SceneError, naming the hinges, if motions at the start have no inertia."""
-        from .undetermined_start import refuse_undetermined_start
+        from .undetermined_start import check_start_determined
 
-        refuse_undetermined_start(self, *self.initial_state())
+        check_start_determined(self, *self.initial_state())
 
     def check_outputs(self) -> None:
         """Raise SceneError for outputs and controller measurements that results do not have."""
@@ -182,7 +188,7 @@ class Model(LinearAnalysis, NotebookDisplay):
         the state at rest.
         """
         from .equilibrium import equilibrium
-        from .lasting import check_lasting
+        from .equilibrium_persistence import with_persistence_findings
 
         remedy = "call equilibrium for each of several"
         start = self.initial_state()[0] if q is None else single_state("q", q, self.nq, remedy)
@@ -190,7 +196,7 @@ class Model(LinearAnalysis, NotebookDisplay):
         step_limit = integer("max_steps", max_steps, 1, "a number of steps from 1 on")
         state = equilibrium(self, start, t, tolerance, step_limit, progress)
         linearise = partial(self.linearize, np.asarray(state), None, t, inputs=(), disturbances=())
-        return check_lasting(self, state, t, linearise)
+        return with_persistence_findings(self, state, t, linearise)
 
     def simulate(
         self,

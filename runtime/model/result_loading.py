@@ -121,7 +121,7 @@ def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
     2026-11-29: which rows are at rest.  Older runs did not depend on them.
     """
     system, rows = model.packed_scene.system, run.memory
-    missing = [system.strained] * (system.strained >= 0), [*system.chosen]
+    missing = [system.strain_index] * (system.strain_index >= 0), [*system.inactive_row_indices]
     for places in (missing[1], missing[0] + missing[1]):
         if places and rows.ndim == 2 and rows.shape[1] == system.n_memory - len(places):
             extended = np.zeros((len(rows), system.n_memory))
@@ -130,7 +130,7 @@ def _with_missing_memory(model: Model, run: Trajectory) -> Trajectory:
     return run
 
 
-def _fits(model: Model, run: Trajectory) -> bool:
+def _has_valid_sizes(model: Model, run: Trajectory) -> bool:
     """Whether all arrays of a run have the sizes that the scene and the samples imply."""
     n, memory = len(run.t), model.packed_scene.system.n_memory
     expected = {
@@ -154,7 +154,7 @@ def _rebuild_result(data: Any, path: Path) -> Result:
     model = Model(scene, known=elements, sweep=data.attrs.get("sweep", "riccati"))
     model.fusion = NoFusedCode(f"the saved run was made by the {data.attrs['engine']} one")
     run = _with_missing_memory(model, provenance.read_trajectory(data))
-    if not _fits(model, run):
+    if not _has_valid_sizes(model, run):
         raise SceneError(f'result file "{path}": its states do not fit its scene')
     if data.attrs["kernels_sha256"] != kernels_hash(model.known):
         note = "saved with other kernels: quantities beyond q and u come from the present ones"

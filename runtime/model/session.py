@@ -203,7 +203,7 @@ class Session:
     @property
     def risks(self) -> tuple[Risk, ...]:
         """Objections to the fixed step, and to conditions of events that may have been missed."""
-        unseen_condition = self._run.unseen
+        unseen_condition = self._run.missed_condition
         return (
             self._risks
             if unseen_condition is None
@@ -229,11 +229,13 @@ class Session:
         """Outputs of the scene at the current state by name: numbers, or arrays for vectors."""
         if self._outputs is None:
             self._outputs = MeasuredOutputs(self._system.engine)
-        values = self._outputs.at(self._system.run, self.t, self._projected_state())
-        if self._outputs.others:
+        values = self._outputs.evaluate(self._system.run, self.t, self._projected_state())
+        if self._outputs.remaining_names:
             quantities = self.result().outputs()
             values |= {
-                name: quantities[name][0] for name in self._outputs.others if name in quantities
+                name: quantities[name][0]
+                for name in self._outputs.remaining_names
+                if name in quantities
             }
         return values
 
@@ -308,16 +310,17 @@ def settable_inputs(model: CompiledScene) -> tuple[str, ...]:
     drives = [active for active in active_expressions(model.scene) if active.drive]
     drive_inputs = {name for active in drives for name in active.inputs}
     time_dependent = {
-        name for name, number in model.packed_scene.channels.items() if not number.stands
+        name for name, number in model.packed_scene.channels.items() if not number.is_constant
     }
-    excluded = {*drive_inputs, *model.scene.controlled, *time_dependent}
+    excluded = {*drive_inputs, *model.scene.controllers_by_input, *time_dependent}
     return tuple(entry.name for entry in model.scene.input if entry.name not in excluded)
 
 
 def unsettable_reason(model: CompiledScene, name: str, names: Sequence[str]) -> str:
     """Message why an input cannot be set during a session."""
-    if name in model.scene.controlled:
-        return f'inputs["{name}"]: controller "{model.scene.controlled[name]}" sets this input'
+    if name in model.scene.controllers_by_input:
+        controller = model.scene.controllers_by_input[name]
+        return f'inputs["{name}"]: controller "{controller}" sets this input'
     for active in active_expressions(model.scene):
         if (
             active.drive
@@ -325,8 +328,9 @@ def unsettable_reason(model: CompiledScene, name: str, names: Sequence[str]) -> 
             and any(i.name == name for i in model.scene.input)
         ):
             return (
-                f'inputs["{name}"]: the {active.what} follows this input, and a jump of a drive is '
-                "an impact; set its rates or a signal before the session, by with_inputs"
+                f'inputs["{name}"]: the {active.description} follows this input, and a jump '
+                "of a drive is an impact; set its rates or a signal before the session, by "
+                "with_inputs"
             )
     if any(entry.name == name for entry in model.scene.input):
         return (

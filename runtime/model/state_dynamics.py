@@ -124,7 +124,7 @@ class DynamicsQueries(KinematicQueries):
         """
         if self.independent_speeds is None:
             return self.inverse_dynamics(q, u, np.zeros(self.nu), t, out=out)
-        places = list(self.independent_speeds.places)
+        places = list(self.independent_speeds.indices)
         return copy_to(out, self.inverse_dynamics(q, u, np.zeros(len(places)), t)[..., places])
 
     def gravity_efforts(self, q: ArrayLike, *, out: Array | None = None) -> Array:
@@ -149,7 +149,7 @@ class DynamicsQueries(KinematicQueries):
         )
         if self.independent_speeds is None:
             return with_gravity - without_gravity
-        return self.independent_speeds.following(q, self.independent_speeds.places).T @ (
+        return self.independent_speeds.motion_matrix(q, self.independent_speeds.indices).T @ (
             with_gravity - without_gravity
         )
 

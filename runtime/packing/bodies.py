@@ -64,7 +64,7 @@ class Bodies:
 
     def placement(self, body: int) -> Placement:
         """Internal frame of a body, given by its number."""
-        carrier = self.carried.by.get(body)
+        carrier = self.carried.carriers.get(body)
         if carrier is not None:
             return self.carried.pose_in_carrier(body, self._placements[carrier][0])
         if body < len(self.scene.body):
@@ -87,7 +87,7 @@ class Bodies:
         placements = self._placements[run.body]
         self._last[run.body] = placements[-1]
         del placements[period:]
-        return BodyRun(run.place, run.parent, run.count, period, tuple(members), slots)
+        return BodyRun(run.position, run.parent, run.count, period, tuple(members), slots)
 
     # --- one body ---------------------------------------------------------------------------
 
@@ -141,7 +141,7 @@ class Bodies:
                 port, np.array(floating_frame.rotation), np.array(floating_frame.origin)
             )
         return modal, SectionNumbers(
-            self.topology.place_of_body(frame), passage.inward, Arrays(section_inputs(port)),
+            self.topology.position_of_body(frame), passage.inward, Arrays(section_inputs(port)),
             tuple(port.rotation.ravel().tolist()),
         )  # fmt: skip
 
@@ -164,7 +164,7 @@ class Bodies:
         if k + 1 < run.count:
             body, end = self.scene.bodies[run.body + k], run.ends[k % len(run.ends)]
             return self.scene.hinges[run.hinge + k + 1], end_pose(body, end)
-        child = self._first_children.get(run.place + k)
+        child = self._first_children.get(run.position + k)
         if child is None:
             return None
         inboard_end = end_pose(self.scene.bodies[child.on], child.inboard_end)

@@ -44,8 +44,8 @@ def build_layout(
             name, "modes", q, u, body.modes, units, speeds, rates, None, True, True, False
         )  # fmt: skip
         q, u = q + n, u + n
-    internal = range(len(expanded.described.hinge), len(scene.hinge))
-    return Layout(scene, tuple(groups), q, u, modal, internal, expanded.described.channels)
+    internal = range(len(expanded.user_scene.hinge), len(scene.hinge))
+    return Layout(scene, tuple(groups), q, u, modal, internal, expanded.user_scene.channels)
 
 
 def _slots(

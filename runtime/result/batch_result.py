@@ -14,7 +14,7 @@ from mstmm.argument_validation import require_path
 from mstmm.array_validation import Array, integer
 from mstmm.errors import SceneError
 from mstmm.optional_packages import missing_package_error
-from mstmm.risk import RUN, AssessedAnswer, Risk
+from mstmm.risk import RUN, AssessedResult, Risk
 
 from ..integrate.c_loop import Statistics, Status
 from ..run.batch.batch_run import BatchData
@@ -51,7 +51,7 @@ class BatchRun(Record):
         return default_candidates(self)
 
 
-class BatchResult(AssessedAnswer, BatchData):
+class BatchResult(AssessedResult, BatchData):
     """Results of n runs, with all quantities of single runs except the work.
 
     Values are nan at times that a run did not reach. The runs are not checked, so a batch is never
@@ -82,7 +82,7 @@ class BatchResult(AssessedAnswer, BatchData):
         if k >= count:
             raise SceneError(f"run = {k}: expected {expected}")
         k %= count
-        model, reached = self.models.of(k), self._reached(k)
+        model, reached = self.models.model_of_run(k), self._finite_samples(k)
         expanded = model.packed_scene.expanded
         rigid = None if expanded is None else expanded.rigidified
         if rigid is not None and rigid.one_way:
@@ -135,7 +135,7 @@ class BatchResult(AssessedAnswer, BatchData):
         for k in range(len(self.q)):
             run_variables, reached = (
                 xarray_dataset.dataset_variables(self.result(k))[0] if k else variables,
-                self._reached(k),
+                self._finite_samples(k),
             )
             for name, (dims, values, attributes) in run_variables.items():
                 if name in _ABSENT_QUANTITIES or dims[:1] != ("time",):
@@ -182,7 +182,7 @@ class BatchResult(AssessedAnswer, BatchData):
 
         selection, run_indices = (
             PlotSelection(names),
-            [k for k in range(len(self.q)) if self._reached(k).any()],
+            [k for k in range(len(self.q)) if self._finite_samples(k).any()],
         )
         _reject_absent(names)
         if not run_indices:
@@ -198,7 +198,7 @@ class BatchResult(AssessedAnswer, BatchData):
         return figure.figure
 
     def _bands(self, wanted: PlotSelection, there: Sequence[int]) -> list[Panel]:
-        longest = max(there, key=lambda k: self._reached(k).sum())
+        longest = max(there, key=lambda k: self._finite_samples(k).sum())
         panel_list = build_panels({"run": self.result(longest)}, wanted)
         quantities = iter(self._quantities([name for panel in panel_list for name in panel.names]))
         band_label = (
@@ -213,7 +213,7 @@ class BatchResult(AssessedAnswer, BatchData):
             for panel in panel_list
         ]  # fmt: skip
 
-    def _reached(self, k: int) -> Any:
+    def _finite_samples(self, k: int) -> Any:
         """Mask (m,) of the output times at which run k has a finite state."""
         return np.isfinite(self.q[k]).all(axis=1) & np.isfinite(self.u[k]).all(axis=1)
 
@@ -225,7 +225,7 @@ class BatchResult(AssessedAnswer, BatchData):
         templates: list[Quantity] = []
         values: list[Array] = []
         for k in range(len(self.q)):
-            run, reached = self.result(k), self._reached(k)
+            run, reached = self.result(k), self._finite_samples(k)
             quantities = [run.quantity(name) for name in names]
             if not k:
                 templates = quantities

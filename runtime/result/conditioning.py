@@ -140,7 +140,7 @@ def pivot_loss(model: CompiledScene, run: Trajectory) -> PivotLoss | None:
         or model.packed_scene.qr
     ):
         return None
-    if model.packed_scene.system.closes:
+    if model.packed_scene.system.has_loops:
         return None
     refines = int(model.packed_scene.model.refines)
     worst, pivots = PivotLoss(0.0, "", 0.0, refines), _PivotRatios(model)
@@ -173,16 +173,16 @@ class _PivotRatios:
         speeds = system.rows(lambda body: body.nu)[:, None]
         blocks = packed.written.blocks[:, None]
         self.inertia = blocks + lib.MSTMM_BLOCK_S + np.arange(21)
-        self.turn = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
+        self.rotation_columns = blocks + lib.MSTMM_BLOCK_R + np.arange(9)
         self.shift = blocks + lib.MSTMM_BLOCK_SHIFT + np.arange(3)
         column = np.arange(6)
-        self.there = column < speeds  # (n, 6): existing columns of H
+        self.has_column = column < speeds  # (n, 6): existing columns of H
         first = blocks + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_H * speeds
         rows = first[:, :, None] + np.arange(6)[:, None] * speeds[:, :, None]
-        self.subspace = rows + np.where(self.there, column, 0)[:, None, :]
+        self.subspace = rows + np.where(self.has_column, column, 0)[:, None, :]
         self.release = system.rows(lambda body: body.release)
         self.rotor = system.rows(lambda body: _pad_to_six(body.rotor))
-        self.imposed = system.rows(lambda body: _pad_to_six(body.imposed)) != 0
+        self.is_prescribed = system.rows(lambda body: _pad_to_six(body.imposed)) != 0
         self.modal = ModalPivots(packed, lib)
 
     def ratios(self, numbers: Array, memory: Array) -> Array:
@@ -194,15 +194,15 @@ class _PivotRatios:
         S = np.zeros((len(self.parents), 6, 6))
         S[:, _UPPER_TRIANGLE[0], _UPPER_TRIANGLE[1]] = numbers[self.inertia]
         S = S + np.triu(S, 1).transpose(0, 2, 1)
-        free = self.there & ~(self.imposed & ~self._released(memory)[:, None])
+        free = self.has_column & ~(self.is_prescribed & ~self._is_released(memory)[:, None])
         H = np.where(free[:, None, :], numbers[self.subspace], 0.0)
         D = H.transpose(0, 2, 1) @ S @ H + (self.rotor * free + ~free)[:, :, None] * np.eye(6)
         inverse = np.linalg.inv(D)
         projection = np.eye(6) - H @ inverse @ H.transpose(0, 2, 1) @ S
-        rotation = numbers[self.turn].reshape(-1, 3, 3)
+        rotation = numbers[self.rotation_columns].reshape(-1, 3, 3)
         motion = _carried_motion(rotation, numbers[self.shift])
         E = np.abs(np.diagonal(S, axis1=1, axis2=2))[:, :, None] * np.eye(6)
-        self.modal.through(numbers, S, motion, self.parents, E)
+        self.modal.add_modal_response(numbers, S, motion, self.parents, E)
         transfer = projection @ motion
         for i in range(len(self.parents) - 1, -1, -1):
             parent = self.parents[i]
@@ -213,7 +213,7 @@ class _PivotRatios:
         ratios = np.where(free, rounding / np.maximum(np.abs(pivots), 1e-300), 0.0)
         return np.asarray(ratios.max(axis=1))
 
-    def _released(self, memory: Array) -> NDArray[np.bool_]:
+    def _is_released(self, memory: Array) -> NDArray[np.bool_]:
         padded_memory = np.append(memory, 0.0)
         return np.asarray(padded_memory[self.release] != 0.0) & (self.release >= 0)
 
@@ -286,7 +286,7 @@ def _singularity_kernel(model: CompiledScene, number: int) -> Any:
     packed = model.packed_scene
     if not packed.layout.slots(number).nq:
         return None
-    body = packed.system.body(packed.topology.place_of_hinge(number))
+    body = packed.system.body(packed.topology.position_of_hinge(number))
     kernel = packed.elements[body.hinge].functions.get("singularity")
     if kernel is None:
         return None
@@ -297,7 +297,7 @@ def _singularity_measures(model: CompiledScene, run: Trajectory, number: int, ca
     """Singularity measure of one hinge at every sample."""
     packed = model.packed_scene
     ffi, slots = packed.ffi, packed.layout.slots(number)
-    p = packed.system.body(packed.topology.place_of_hinge(number)).hinge_p or (0.0,)
+    p = packed.system.body(packed.topology.position_of_hinge(number)).hinge_p or (0.0,)
     coordinates = np.ascontiguousarray(run.q[:, slots.q_slice])
     measures, pointer = np.full(len(coordinates), np.nan), ffi.new("double *")
     for k, row in enumerate(coordinates):

@@ -94,7 +94,7 @@ def momentum_drifts(result: Record) -> list[Drift]:
     bodies = scene.skeleton.bodies
     sampled_indices = range(0, len(bodies), max(1, len(bodies) // _MAX_SAMPLED_BODIES))
     names = [bodies.name(i) for i in sampled_indices]
-    result._observed.fetch(names)
+    result._observations.fetch(names)
     reach = max((_max_abs(result.position(name)) for name in names), default=0.0)
     pivot, pivot_label = _momentum_pivot(result, reach)
     reach = max((_max_abs(result.position(name) - pivot) for name in names), default=0.0)
@@ -209,7 +209,7 @@ def _unsupported_axes(
     if all(map(_carries_nothing, roots)):
         return [True] * 3, [True] * 3
     force, moment = np.zeros((len(result.t), 3)), np.zeros((len(result.t), 3))
-    largest = result._observed.largest_loads()
+    largest = result._observations.largest_loads()
     sizes = (
         max(largest[0], kinetic / reach if reach > 0 else 0.0),
         max(largest[1] + largest[0] * reach, kinetic),

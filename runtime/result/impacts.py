@@ -40,7 +40,7 @@ def momentum_kept_by_impacts(
     if impacts and kept.any():
         scene = _RigidScene(result, roots, pivot)
         for row, event in impacts:
-            kept &= scene.untouched(row, event, kept)
+            kept &= scene.rigid_motion_axes(row, event, kept)
             if not kept.any():
                 break
     return kept
@@ -70,10 +70,12 @@ class _RigidScene:
         self._speeds = [result.coordinate_info(hinge.name).u_slice for hinge in roots]
         self._names = [hinge.outboard for hinge in roots]
         self._arms = [result.position(name) - pivot for name in self._names]
-        references = result._observed.references
+        references = result._observations.references
         self._kinematics = Kinematics(result.model.looped, NoFusedCode(), references, lambda: None)
 
-    def untouched(self, row: int, event: int, asked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def rigid_motion_axes(
+        self, row: int, event: int, asked: NDArray[np.bool_]
+    ) -> NDArray[np.bool_]:
         """Mask of the `asked` axes (6,) along and about which the scene can move rigidly.
 
         The motion must not change the distance to the object of the event.
@@ -81,7 +83,7 @@ class _RigidScene:
         speeds, allowed = self._rigid(row)
         remaining = asked & allowed
         try:
-            remaining[remaining] = self._stays(
+            remaining[remaining] = self._is_constant(
                 row, event, speeds[remaining], self._sizes(row)[remaining]
             )
         except NumericalFailure:
@@ -107,13 +109,13 @@ class _RigidScene:
         max_arm = max((float(np.linalg.norm(arms[row])) for arms in self._arms), default=0.0)
         return np.array([1.0, 1.0, 1.0, max_arm, max_arm, max_arm])
 
-    def _stays(self, row: int, event: int, motions: Array, sizes: Array) -> list[bool]:
+    def _is_constant(self, row: int, event: int, motions: Array, sizes: Array) -> list[bool]:
         """Whether an event's value is constant at one sample, for each of the speeds (n, nu)."""
         run, system = self._result.trajectory, self._system
         system.memory[:] = run.memory[row]
         t, y = float(run.t[row]), np.concatenate([run.q[row], run.u[row]])
-        rest_rate = system.meeting(event, t, y, np.zeros(motions.shape[1])).rate
-        approaches = [system.meeting(event, t, y, u) for u in motions]
+        rest_rate = system.approach_rate(event, t, y, np.zeros(motions.shape[1])).rate
+        approaches = [system.approach_rate(event, t, y, u) for u in motions]
         return [
             abs(approach.rate - rest_rate)
             <= _ZERO_RATIO * (approach.size + approach.steepness * scale)

@@ -14,7 +14,7 @@ from mstmm.plain_data import stored_as
 from ..engine.loops.loop_analysis import NEGLIGIBLE_MISFIT
 from ..engine.loops.loop_calls import LoopCalls
 from ..integrate.steppers import INDEX3_SUFFIX
-from ..packing.loops.system_variants import LOCKED, characteristic_length
+from ..packing.loops.system_variants import LOCKING_GAP_FRACTION, characteristic_length
 
 if TYPE_CHECKING:
     from ..engine.compiled_scene import CompiledScene
@@ -67,26 +67,26 @@ def loop_closure(model: CompiledScene, run: Trajectory) -> Closure | None:
 
     Loops that a release has opened have no gap.
     """
-    if model.closed is None or not len(run.t):
+    if model.loop_start is None or not len(run.t):
         return None
     calls, gap, slip = LoopCalls(model.looped, np.array(run.q[0])), 0.0, 0.0
     misfit, misfit_loop = (
-        NEGLIGIBLE_MISFIT * LOCKED * characteristic_length(model.packed_scene.system),
+        NEGLIGIBLE_MISFIT * LOCKING_GAP_FRACTION * characteristic_length(model.packed_scene.system),
         "",
     )
     for k in np.unique(np.linspace(0, len(run.t) - 1, _MAX_SAMPLES).astype(int)):
         q, u, t = np.array(run.q[k]), np.array(run.u[k]), float(run.t[k])
         if model.packed_scene.releases:
             calls.memory = np.array(run.memory[k])
-        gaps = _residuals(calls, calls.gap, q, u, t)
+        gaps = _residuals(calls, calls.position_level, q, u, t)
         redundant_gaps = np.where(calls.inverses() > 0, 0.0, gaps)
         row = int(np.argmax(redundant_gaps))
         if redundant_gaps[row] > max(misfit, _MISFIT_RATIO * np.max(gaps - redundant_gaps)):
-            misfit, misfit_loop = float(redundant_gaps[row]), calls.closing(row)
+            misfit, misfit_loop = float(redundant_gaps[row]), calls.closing_label(row)
         gap = max(gap, float(np.max(gaps)))
-        slip = max(slip, float(np.max(_residuals(calls, calls.slip, q, u, t))))
+        slip = max(slip, float(np.max(_residuals(calls, calls.velocity_level, q, u, t))))
     on_positions = run.settings.method.endswith(INDEX3_SUFFIX)
-    loops = model.closed.loops
+    loops = model.loop_start.loops
     return Closure(
         gap, slip, loops.summary, loops.redundant_text(_MAX_NAMED_ROWS), loops.indeterminate_text,
         on_positions, misfit if misfit_loop else 0.0, misfit_loop,
@@ -99,5 +99,5 @@ def _residuals(calls: LoopCalls, level: int, q: Array, u: Array, t: float) -> Ar
         residuals = np.abs(calls.correction(level, q, u, t=t)[1])
     except NumericalFailure:
         return np.full(calls.count, np.nan)
-    residuals[calls.let_go()] = 0.0
+    residuals[calls.released_rows()] = 0.0
     return residuals

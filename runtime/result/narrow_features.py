@@ -70,13 +70,13 @@ class _SampledPath:
     Its values (n,) at the start, the samples and the end; between two of them the smallest and the
     largest, and the largest distance of a step, (n - 1,); its unit. `ranges` are the ranges of
     functions of time over the whole run, by term: such functions are known between neighbours of
-    `ends` only.
+    `positions` only.
     """
 
-    ends: Array
-    least: Array
-    most: Array
-    moved: Array
+    positions: Array
+    minima: Array
+    maxima: Array
+    step_distances: Array
     unit: str
     ranges: Mapping[int, float] = field(default_factory=dict)
 
@@ -160,7 +160,7 @@ def _coordinate_candidates(
                 path = _coordinate_path(model, run, fractions, name, hinge)
                 if path is not None:
                     yield (
-                        load.what,
+                        load.description,
                         ExpressionFunctions(load.expression, constants, names=(name.text,)),
                         path,
                     )
@@ -196,7 +196,11 @@ def _time_candidates(
                 view = ExpressionFunctions(
                     load.expression, constants, False, order, make_enclosures(t, piece, names)
                 )
-                yield load.what, view, _SampledPath(t, t[:-1], t[1:], step_lengths, "s", ranges)
+                yield (
+                    load.description,
+                    view,
+                    _SampledPath(t, t[:-1], t[1:], step_lengths, "s", ranges),
+                )
 
 
 def _peaked_terms(view: ExpressionFunctions) -> list[WatchedFunction]:
@@ -360,25 +364,26 @@ def _first_missed_peak(
     view: ExpressionFunctions, path: _SampledPath, ends_are_steps: bool
 ) -> tuple[float, float, float] | None:
     """First missed peak: (position, length of steps there, required length)."""
-    low, high = float(path.least.min()), float(path.most.max())
+    low, high = float(path.minima.min()), float(path.maxima.max())
     watched = _peaked_terms(view) if path.ranges else view.narrow_candidates()
     if not high > low or not watched:
         return None
-    edges = path.ends if path.ranges else None
-    max_cells = _MAX_CELLS_PER_PIECE if path.ranges else view.most
+    edges = path.positions if path.ranges else None
+    max_cells = _MAX_CELLS_PER_PIECE if path.ranges else view.max_cells
     resolution = step_limits(view.terms, watched, low, high, max_cells, edges)
-    is_narrow = resolution.longest < path.moved.max(initial=0.0)
+    is_narrow = resolution.longest < path.step_distances.max(initial=0.0)
     if not is_narrow.any():
         return None
     root = view.expression.root
     for term in watched:
         positions, values, limits = _narrow_peaks(view, term, resolution, is_narrow, high)
-        ends = view.values(term.term, path.ends)
+        ends = view.values(term.term, path.positions)
         for position, value, limit in zip(positions, values, limits, strict=True):
             is_long = (
-                path.moved > (_TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0) * limit
+                path.step_distances
+                > (_TIME_STEP_FACTOR if path.ranges and ends_are_steps else 1.0) * limit
             )
-            missed = (path.least <= position) & (position <= path.most) & is_long
+            missed = (path.minima <= position) & (position <= path.maxima) & is_long
             if ends_are_steps or path.ranges:
                 function_range = max(
                     np.ptp(np.append(values, ends)), path.ranges.get(term.term, 0.0)
@@ -387,13 +392,13 @@ def _first_missed_peak(
                     _hidden_height(value, ends, ends_are_steps) > _MIN_PEAK_RATIO * function_range
                 )
             if path.ranges and missed.any():  # a narrow part may not affect the whole
-                whole_values = view.values(root, np.append(path.ends, position))
+                whole_values = view.values(root, np.append(path.positions, position))
                 missed &= (
                     _hidden_height(whole_values[-1], whole_values[:-1], ends_are_steps)
                     > _MIN_PEAK_RATIO * path.ranges[root]
                 )
             if missed.any():
-                return position, float(path.moved[missed].max()), limit
+                return position, float(path.step_distances[missed].max()), limit
     return None
 
 

@@ -48,7 +48,7 @@ class Observations:
         """Motion (n, 24) of "body" or "body.end", see `Observation`."""
         require_word("body", reference, "the name of a body or an end, such as 'rod1.tip'")
         if reference not in self._points:
-            canonical_name = self.references.place(reference)
+            canonical_name = self.references.canonical_name(reference)
             self._observe("points", canonical_name)
             self._points[reference] = self._points[canonical_name]
         return self._points[reference]
@@ -59,7 +59,7 @@ class Observations:
         Bodies of the engine's scene are, for example, point masses of a beam, "blade/point 1".
         """
         if name not in self._points:
-            self._seen([name], ("points",))
+            self._observe_parts([name], ("points",))
         return self._points[name]
 
     def fetch(self, references: Sequence[str]) -> None:
@@ -67,7 +67,7 @@ class Observations:
         if len(self.references) > _MAX_JOINT_REFERENCES:
             missing = [name for name in references if name not in self._points]
             if missing and len(self.run.t) * 24 * len(missing) <= _MAX_BATCH_NUMBERS:
-                self._seen(missing, ("points",))
+                self._observe_parts(missing, ("points",))
 
     def part(self, name: str) -> Array:
         """Array of loads, efforts, udot, sums or rows, see `Observation`."""
@@ -129,9 +129,9 @@ class Observations:
             references = [] if reference is None else [reference]
         else:
             references = list(self.references)
-        self._seen(references, parts)
+        self._observe_parts(references, parts)
 
-    def _seen(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
+    def _observe_parts(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
         run = self.run
         probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
         observation = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)

@@ -113,8 +113,8 @@ class Result(Record, NotebookDisplay):
     ) -> Any:
         """`matplotlib` figure of quantities by name, one panel per unit (extra: plot).
 
-        Names of `pictures` draw flexible bodies. Without names: the shapes of flexible bodies, and
-        of the outputs of the scene, or else of coordinates, Euler angles and deflections, those
+        Names of `picture_names` draw flexible bodies. Without names: the shapes of flexible bodies,
+        and of the outputs of the scene, or else of coordinates, Euler angles and deflections, those
         that move most; the legend notes what was left out. With `path`, also written there (.png,
         .svg, .pdf).
 

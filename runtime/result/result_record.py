@@ -59,8 +59,8 @@ class Record(FlexibleResults, ABC):
         self.t, self.q, self.u, self.event = run.t, run.q, run.u, run.event
         self.status = run.status
         self.statistics, self.settings = run.statistics, run.settings
-        self._observed = Observations(model, run)
-        self._quantities = Quantities(self._observed, self)
+        self._observations = Observations(model, run)
+        self._quantities = Quantities(self._observations, self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the model, the run and meshes; derived quantities are computed again."""
@@ -113,11 +113,11 @@ class Record(FlexibleResults, ABC):
             and max(_max_abs(run.q), _max_abs(run.u), _max_abs(run.work)) < _MAX_SAFE_MAGNITUDE
         ):
             return ""
-        sums = self._observed.part("sums")
+        sums = self._observations.part("sums")
         failing = np.isnan(sums).any(axis=1)
-        if self._observed.failures and failing.any():
+        if self._observations.failures and failing.any():
             count = f"{failing.sum()} of {len(sums)} samples cannot be evaluated"
-            return f"{count}: {self._observed.failures[0]}"
+            return f"{count}: {self._observations.failures[0]}"
         finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
         return "" if finite else "its energies or momenta are beyond what numbers hold"
 
@@ -165,7 +165,7 @@ class Record(FlexibleResults, ABC):
         Findings are left out if the run was to ignore them.
         """
         risks = self.risks if self.trajectory.reported_risks else ()
-        notes, failures = self.trajectory.notes, self._observed.failures
+        notes, failures = self.trajectory.notes, self._observations.failures
         return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
 
     def _outside(self) -> tuple[Risk, ...]:
@@ -179,30 +179,30 @@ class Record(FlexibleResults, ABC):
 
         Here and below: SceneError, with the nearest name, for an unknown name.
         """
-        return self._quantities.of_body(reference, "position")
+        return self._quantities.body_quantity(reference, "position")
 
     def velocity(self, reference: str) -> Array:
         """Velocity (n, 3) in m/s."""
-        return self._quantities.of_body(reference, "velocity")
+        return self._quantities.body_quantity(reference, "velocity")
 
     def acceleration(self, reference: str) -> Array:
         """Acceleration (n, 3) in m/s2, gravity not subtracted."""
-        return self._quantities.of_body(reference, "acceleration")
+        return self._quantities.body_quantity(reference, "acceleration")
 
     def orientation(self, reference: str) -> Array:
         """Unit quaternion (n, 4), w, x, y, z, of the user's axes to inertial axes.
 
         Its sign is continuous over time and w >= 0 in the first sample.
         """
-        return self._quantities.of_body(reference, "orientation")
+        return self._quantities.body_quantity(reference, "orientation")
 
     def angular_velocity(self, reference: str) -> Array:
         """Angular velocity (n, 3) in rad/s."""
-        return self._quantities.of_body(reference, "angular_velocity")
+        return self._quantities.body_quantity(reference, "angular_velocity")
 
     def angular_acceleration(self, reference: str) -> Array:
         """Angular acceleration (n, 3) in rad/s2."""
-        return self._quantities.of_body(reference, "angular_acceleration")
+        return self._quantities.body_quantity(reference, "angular_acceleration")
 
     # --- hinges ---------------------------------------------------------------------------------
 
@@ -216,11 +216,11 @@ class Record(FlexibleResults, ABC):
 
     def force(self, hinge: str) -> Array:
         """Force (n, 3) in N of the inboard on the outboard side of a hinge, inertial axes."""
-        return self._quantities.of_hinge(hinge, "force")
+        return self._quantities.hinge_quantity(hinge, "force")
 
     def moment(self, hinge: str) -> Array:
         """Moment (n, 3) in N*m of the inboard on the outboard side about P, inertial axes."""
-        return self._quantities.of_hinge(hinge, "moment")
+        return self._quantities.hinge_quantity(hinge, "moment")
 
     def effort(self, hinge: str) -> Array:
         """Efforts (n, nu) in N, N*m along the speeds of a hinge, of its law or its drive."""
@@ -233,7 +233,7 @@ class Record(FlexibleResults, ABC):
     @property
     def udot(self) -> Array:
         """Accelerations (n, nu) of the hinge speeds, m/s2, rad/s2."""
-        return self._observed.part("udot")
+        return self._observations.part("udot")
 
     # --- sums -----------------------------------------------------------------------------------
 

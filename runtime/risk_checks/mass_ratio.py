@@ -30,7 +30,7 @@ def applies_to(model: CompiledScene) -> bool:
     """Whether mass ratios are so large that digits may be lost."""
     if (
         model.packed_scene.qr
-        or model.packed_scene.system.closes
+        or model.packed_scene.system.has_loops
         or len(model.scene.bodies) > _MAX_BODIES
     ):
         return False

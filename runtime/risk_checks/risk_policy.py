@@ -36,7 +36,7 @@ def check_start(
         step = check_step(model.looped, settings, q, u)
         step_risks = () if step is None or step.risk is None else (step.risk,)
         _reject_objections((*model.scene.risks, *step_risks, *findings.risks), "before the run")
-    return findings if on_risk != "ignore" else replace(findings, told=False)
+    return findings if on_risk != "ignore" else replace(findings, risks_reported=False)
 
 
 def apply_policy(result: Result, on_risk: str) -> Result:

@@ -14,12 +14,12 @@ def initial_state(compiled: CompiledScene) -> tuple[Array, Array]:
     """Initial state (q, u) at t = 0; NumericalFailure where a static deformation is not found."""
     packed, engine = compiled.packed_scene, compiled.looped
     q, u = start_values(packed.scene, compiled.coordinate_layout, packed.flexible)
-    if compiled.closed is None:
+    if compiled.loop_start is None:
         y = SceneSystem(engine).start(0.0, q, u)
         q, u = y[: compiled.nq], y[compiled.nq : compiled.nq + compiled.nu]
     else:
-        q, u = (x.copy() for x in compiled.closed.start)
-    tables = (*packed.described.beam, *packed.described.elastic)
+        q, u = (x.copy() for x in compiled.loop_start.start)
+    tables = (*packed.user_scene.beam, *packed.user_scene.elastic)
     static_names = [b.name for b in tables if b.name in packed.flexible and b.initial.static]
     if not static_names:
         return q, u

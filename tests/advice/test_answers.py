@@ -36,7 +36,7 @@ def test_bodies_that_respond_no_way_but_coupled() -> None:
     (body,) = made.bodies
     assert body.evidence is not None
     assert body.evidence.deflection == pytest.approx(1.07e-2, rel=0.01)
-    assert body.model.coupled
+    assert body.model.is_coupled
     assert made.error <= 1e-2
     refused = [one for one in made.tried_models if one.error is None]
     assert refused == [] or all("drag" in one.reason for one in refused)

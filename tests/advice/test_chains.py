@@ -90,7 +90,7 @@ def test_welded_members_are_one() -> None:
     assert read.hinge[0].inboard == "ground"
     after = places(read, [rename_reference(name, found.names) for name in NAMES])
     assert np.abs(places(scene, NAMES) - after).max() < 1e-11
-    assert found.still["post.top"] == (0.0, 1.0, 0.0)
+    assert found.fixed_points["post.top"] == (0.0, 1.0, 0.0)
 
 
 def test_a_chain_on_what_is_welded_to_the_ground_stays_one() -> None:

@@ -65,7 +65,7 @@ def test_the_same_motion(rng: np.random.Generator) -> None:
     found = merge_welds(scene)
     assert found is not None
     assert [body.name for body in found.scene.body] == ["p", "s"]
-    assert found.into == {"q": "p", "r": "p", "t": "s"}
+    assert found.carriers == {"q": "p", "r": "p", "t": "s"}
     loaded = mstmm.Scene(**found.scene.model_dump(by_alias=True, exclude_none=True))
     for place in ("p.b", "q", "q.a", "r.b", "s.a", "t", "t.a"):
         for kind in ("position", "velocity", "orientation"):
@@ -83,8 +83,8 @@ def same(scene: mstmm.Scene, keep: Collection[str] = ()) -> MergedScene:
     for place in (*(body.name for body in scene.body), *ends):
         before = run(scene, f"{place}.position")
         after = (
-            np.tile(found.still[place], (len(before), 1))
-            if place in found.still
+            np.tile(found.fixed_points[place], (len(before), 1))
+            if place in found.fixed_points
             else run(read, f"{rename_reference(place, found.names)}.position")
         )
         assert np.abs(before - after).max() < 1e-9, place
@@ -129,7 +129,7 @@ def test_the_inboard_one_becomes_part_where_the_outboard_one_stays(
     rng: np.random.Generator,
 ) -> None:
     found = same(lumps(rng), keep=["r", "t"])
-    assert found.into == {"q": "r", "p": "r", "s": "t"}
+    assert found.carriers == {"q": "r", "p": "r", "s": "t"}
 
 
 def test_welded_to_the_ground(rng: np.random.Generator) -> None:
@@ -150,9 +150,9 @@ def test_welded_to_the_ground(rng: np.random.Generator) -> None:
     )
     found = same(scene)
     assert [body.name for body in found.scene.body] == ["s"]
-    assert found.into == {"p": "ground", "q": "ground", "r": "ground", "t": "s"}
+    assert found.carriers == {"p": "ground", "q": "ground", "r": "ground", "t": "s"}
     assert set(found.idle) == {'load "load1"', 'spring "idle"'}
-    assert any(text.startswith("the ground: merged with") for text in found.words)
+    assert any(text.startswith("the ground: merged with") for text in found.descriptions)
     stays = same(scene, keep=["q"])
     assert [body.name for body in stays.scene.body] == ["q", "s"]
 

@@ -35,7 +35,7 @@ def test_levels() -> None:
     (d,) = advised("D", 1e-2).bodies
     assert a.model.level == "rigid"
     for body in (b, c):
-        assert body.model.coupled
+        assert body.model.is_coupled
         assert body.model.shapes == (("y", 1),)
     assert d.model.level == "stiffened"
     assert d.model.total in (1, 2)  # which of them is cheaper, the machine decides
@@ -130,7 +130,7 @@ def test_each_body_by_itself_and_in_its_plane() -> None:
     assert boom.model.level == "rigid"
     assert dict(boom.given_model.shapes) == {"y": 2, "z": 1}
     assert boom.error is not None and boom.error < 1e-4
-    assert lash.model.coupled
+    assert lash.model.is_coupled
     assert made.scene.hinge[1].type == "pin"
     assert any("elbow" in text for text in made.other_changes)
     assert made.model_saving is not None and made.model_saving > 2
@@ -180,7 +180,7 @@ def test_a_body_of_finite_elements_keeps_its_static_shapes() -> None:
     made = mstmm.advise(scene, 0.3, error=1e-3, of="rod.tip.position", rounds=0, budget=600)
     (body,) = made.bodies
     assert dict(body.given_model.shapes) == {"vibration": 2}
-    assert body.model.coupled
+    assert body.model.is_coupled
     assert dict(body.model.shapes) == {"vibration": 0}
     assert "static only" in str(body.model)
     assert made.scene.elastic[0].modes == 0

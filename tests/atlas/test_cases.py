@@ -169,7 +169,7 @@ def test_the_remedy_holds_there_and_beyond(name: str) -> None:
 def test_a_case_says_what_a_reader_needs(name: str) -> None:
     (case,) = cases.select_cases([name])
     assert case.name == name
-    for text in (case.title, case.explanation, case.parameter, case.measured, case.source):
+    for text in (case.title, case.cause, case.parameter, case.measured, case.source):
         assert len(text) > 5
     assert len(case.title) < 75
     assert case.method.name != case.remedy.name

@@ -68,7 +68,7 @@ def test_other_errors_are_not_swallowed() -> None:
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        MeasuredMethod(broken, 1.0).holds(0.0)
+        MeasuredMethod(broken, 1.0).is_within_limit(0.0)
 
 
 def test_islands_are_told() -> None:

@@ -18,11 +18,11 @@ from mstmm.atlas.shared_scenes import (
     chain,
     compile_looped,
     double_pendulum,
+    elbow_with_spring,
     four_bar,
     random_pin_states,
     rod,
     spinning_top,
-    sprung_elbow,
 )
 from mstmm.atlas.variants import (
     baumgarte,
@@ -164,7 +164,8 @@ def test_without_the_slope_in_time_the_order_falls(method: str, order: int) -> N
     exact = pulled.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=[1.0]).q[-1]
     errors = [
         np.abs(
-            BareRosenbrock(pulled, method, time_slope=False).fixed(1 / n, n)[-1, 0] - exact
+            BareRosenbrock(pulled, method, time_slope=False).fixed_step_states(1 / n, n)[-1, 0]
+            - exact
         ).max()
         for n in (40, 80)
     ]
@@ -176,11 +177,12 @@ def test_ros3p_is_what_its_authors_say() -> None:
     pulled, table = driven_rod(), ros3p.tableau()
     exact = pulled.simulate(1.0, rtol=1e-12, atol=1e-14, output_times=[1.0]).q[-1]
     errors = [
-        np.abs(BareRosenbrock(pulled, table).fixed(1 / n, n)[-1, 0] - exact).max() for n in (40, 80)
+        np.abs(BareRosenbrock(pulled, table).fixed_step_states(1 / n, n)[-1, 0] - exact).max()
+        for n in (40, 80)
     ]
     assert math.log2(errors[0] / errors[1]) == pytest.approx(3, abs=0.2)
     needed = [
-        BareRosenbrock(pulled, table).needed(1.0, rtol, 1e-2 * rtol, 100_000)
+        BareRosenbrock(pulled, table).adaptive_step_count(1.0, rtol, 1e-2 * rtol, 100_000)
         for rtol in (1e-4, 1e-7)
     ]
     assert needed[1] / needed[0] == pytest.approx(10, rel=0.3)  # the cube root of 1000
@@ -191,7 +193,10 @@ def test_ros3p_is_what_its_authors_say() -> None:
 def test_whole_steps_are_those_of_a_run(method: str) -> None:
     pulled, n = driven_rod(), 80
     run = pulled.simulate(1.0, method, 1 / n, output_times=[1.0])
-    assert np.abs(BareRosenbrock(pulled, method).fixed(1 / n, n)[-1, 0] - run.q[-1]).max() < 1e-13
+    assert (
+        np.abs(BareRosenbrock(pulled, method).fixed_step_states(1 / n, n)[-1, 0] - run.q[-1]).max()
+        < 1e-13
+    )
 
 
 ELBOW_END = 0.5
@@ -199,10 +204,12 @@ ELBOW_END = 0.5
 
 @pytest.mark.parametrize("method, order", [("rodas4", 1), ("rodas4p2", 2), ("rodas5p", 2)])
 def test_by_laws_alone_the_order_falls(method: str, order: int) -> None:
-    arm = sprung_elbow(10.0, 0.2)
+    arm = elbow_with_spring(10.0, 0.2)
     exact = arm.simulate(ELBOW_END, rtol=1e-12, atol=1e-14, output_times=[ELBOW_END]).q[-1]
     errors = [
-        np.abs(LawTangentSteps(arm, method).fixed(ELBOW_END / n, n)[-1, 0] - exact).max()
+        np.abs(
+            LawTangentSteps(arm, method).fixed_step_states(ELBOW_END / n, n)[-1, 0] - exact
+        ).max()
         for n in (128, 256)
     ]
     assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.2)
@@ -210,12 +217,14 @@ def test_by_laws_alone_the_order_falls(method: str, order: int) -> None:
 
 @pytest.mark.parametrize("method", ["ros34pw2", "rodas4pw"])
 def test_steps_by_laws_are_those_of_a_run_where_it_offers_them(method: str) -> None:
-    arm, n = sprung_elbow(1e5, 2e3), 32
+    arm, n = elbow_with_spring(1e5, 2e3), 32
     run = arm.simulate(
         ELBOW_END, method, ELBOW_END / n, output_times=[ELBOW_END], tangent="laws"
     )  # fmt: skip
     assert (
-        np.abs(LawTangentSteps(arm, method).fixed(ELBOW_END / n, n)[-1, 0] - run.q[-1]).max()
+        np.abs(
+            LawTangentSteps(arm, method).fixed_step_states(ELBOW_END / n, n)[-1, 0] - run.q[-1]
+        ).max()
         < 1e-13
     )
 
@@ -229,10 +238,10 @@ class ByWay(BareRosenbrock):
 
 def test_only_the_norm_makes_steps_short() -> None:
     """A spring that swings for nobody to see."""
-    arm = sprung_elbow(1e8)
-    assert ByWay(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 100) < 20
+    arm = elbow_with_spring(1e8)
+    assert ByWay(arm, "rodas4p2").adaptive_step_count(0.5, 1e-4, 1e-6, 100) < 20
     with pytest.raises(mstmm.NumericalFailure, match="more than 1000 steps"):
-        BareRosenbrock(arm, "rodas4p2").needed(0.5, 1e-4, 1e-6, 1000)
+        BareRosenbrock(arm, "rodas4p2").adaptive_step_count(0.5, 1e-4, 1e-6, 1000)
 
 
 # --- closed loops -------------------------------------------------------------------------------

@@ -18,7 +18,12 @@ from mstmm.derive.definition.element import Symbols
 from mstmm.derive.definition.notation import Matrix
 from mstmm.derive.elements.body_rigid import RigidBody
 from mstmm.derive.equations import newton_euler as ne
-from mstmm.derive.equations.mass_distribution import POINT, general, of_tensor, point_masses
+from mstmm.derive.equations.mass_distribution import (
+    POINT,
+    from_inertia_tensor,
+    general,
+    point_masses,
+)
 from mstmm.derive.equations.rigid_body import rigid_body
 from mstmm.derive.lower.kernel_lowering import lower
 from mstmm.ir.interpreter import evaluate_floats
@@ -163,7 +168,7 @@ def test_body_element_is_the_integrated_equation() -> None:
     p = Symbols("p", tuple(x.name for x in RigidBody.parameters))
     inertia = Matrix([[p.Jxx, p.Jxy, p.Jxz], [p.Jxy, p.Jyy, p.Jyz], [p.Jxz, p.Jyz, p.Jzz]])
     center = Matrix([p.mcx, p.mcy, p.mcz]) / p.mass
-    body = of_tensor(p.mass, center, inertia)
+    body = from_inertia_tensor(p.mass, center, inertia)
     derived = ne.inertial_force(body).col_join(ne.euler_form(body))
     a, alpha, w = (sp.Matrix(v) for v in (ne.A0, ne.OMEGADOT, ne.OMEGA))
     stated = RigidBody().residual(a, alpha, w, p)

@@ -81,7 +81,7 @@ def test_the_page_stands_alone(made: Callable[[], Chart]) -> None:
     assert not [a for tag, a in page.seen if "src" in a or "href" in a]
     shown = [w for tag, w in page.words if tag == "title" and "CPU, smallest of" in w]
     inside = build_drawing(chart)
-    assert len(shown) == sum(len(line.points) for line in inside.lines if line.look.mark)
+    assert len(shown) == sum(len(line.points) for line in inside.lines if line.style.mark)
     for point in chart.pareto_front:
         assert any(f"{point.method}, {point.setting}" in w and point.model in w for w in shown)
 
@@ -95,7 +95,7 @@ def test_names_of_the_user_are_words_and_no_elements() -> None:
 def test_every_point_that_ran_is_drawn_once() -> None:
     for chart in (one_level(), levels()):
         made = build_drawing(chart)
-        drawn = [point for line in made.lines if line.look.mark for _, point in line.points]
+        drawn = [point for line in made.lines if line.style.mark for _, point in line.points]
         ran = [point for point in chart.points if plot_position(point) is not None]
         assert len(drawn) + made.beyond == len(ran)
         for line in made.lines:
@@ -151,10 +151,10 @@ def test_long_words_below_the_title_are_not_cut() -> None:
 
 def test_points_of_levels_are_joined_by_their_methods() -> None:
     made = build_drawing(levels())
-    paths = [line for line in made.lines if not line.look.mark and not line.strong]
+    paths = [line for line in made.lines if not line.style.mark and not line.is_emphasised]
     curves = {p.curve for p in levels().points if plot_position(p) is not None}
     assert len(paths) == len(curves)
-    assert all(line.joined for line in paths)
+    assert all(line.is_connected for line in paths)
     assert all(len({p.curve for _, p in line.points}) == 1 for line in paths)
 
 
@@ -176,8 +176,8 @@ def test_labels_do_not_meet() -> None:
         assert made.labels
         boxes = []
         for label in made.labels:
-            right = (label.place[0] - made.x[0]) / (made.x[1] - made.x[0]) * 450 + label.at[0]
-            down = (made.y[1] - label.place[1]) / (made.y[1] - made.y[0]) * 370 + label.at[1]
+            right = (label.position[0] - made.x[0]) / (made.x[1] - made.x[0]) * 450 + label.at[0]
+            down = (made.y[1] - label.position[1]) / (made.y[1] - made.y[0]) * 370 + label.at[1]
             wide = 2.6 * len(label.text)
             boxes.append((right - wide, down - 5, right + wide, down + 5))
         for i, a in enumerate(boxes):

@@ -130,8 +130,8 @@ def test_shares_of_the_budget() -> None:
     assert 0 < REFERENCE < EARLY < SETTINGS < 1
     clock = Clock(0.0)
     budget = Budget(100.0, clock)
-    assert budget.share(SETTINGS) == pytest.approx(100 * SETTINGS / 6)
-    assert budget.share(SETTINGS, waiting=300) == pytest.approx(100 * SETTINGS / 60)
+    assert budget.run_limit(SETTINGS) == pytest.approx(100 * SETTINGS / 6)
+    assert budget.run_limit(SETTINGS, waiting=300) == pytest.approx(100 * SETTINGS / 60)
     clock.now = 90.0
     assert budget.remaining(SETTINGS) == 0.0
     assert budget.remaining() == pytest.approx(10.0)

@@ -12,8 +12,8 @@ from mstmm.runtime.chart.error_times import equidistant_times, refine_times
 
 def test_slow_motions_keep_even_times() -> None:
     times = equidistant_times(2.0, 11)
-    assert times.at == pytest.approx(np.linspace(0, 2, 11))
-    assert times.words == "11 equidistant times up to 2 s"
+    assert times.times == pytest.approx(np.linspace(0, 2, 11))
+    assert times.description == "11 equidistant times up to 2 s"
     steps = np.array([0.0, 1e-3, 1e-2, 0.1, 0.7, 1.3, 2.0])  # as every run begins
     assert refine_times(times, steps) is times
 
@@ -21,21 +21,23 @@ def test_slow_motions_keep_even_times() -> None:
 def test_fast_moments_get_times_of_their_own() -> None:
     steps = np.array([0.0, 0.11, 0.12, 0.14, 0.16, 0.18, 0.5, 1.0])
     found = refine_times(equidistant_times(1.0, 11), steps)
-    assert set(found.at) == {*equidistant_times(1.0, 11).at, 0.11, 0.12, 0.14, 0.16, 0.18}
-    assert np.all(np.diff(found.at) > 0)
-    assert found.words == "11 equidistant times up to 1 s, and 5 more where the motion is fast"
+    assert set(found.times) == {*equidistant_times(1.0, 11).times, 0.11, 0.12, 0.14, 0.16, 0.18}
+    assert np.all(np.diff(found.times) > 0)
+    assert (
+        found.description == "11 equidistant times up to 1 s, and 5 more where the motion is fast"
+    )
 
 
 def test_there_is_an_end_to_it(rng: np.random.Generator) -> None:
     steps = np.sort(rng.uniform(0, 1, 5000))
     found = refine_times(equidistant_times(1.0, 11), steps)
-    assert len(found.at) == 44
-    assert found.at[0] == 0.0 and found.at[-1] == 1.0
+    assert len(found.times) == 44
+    assert found.times[0] == 0.0 and found.times[-1] == 1.0
 
 
 def test_ends_of_steps_at_even_times_are_no_further_ones() -> None:
     steps = np.linspace(0, 1, 41) + 1e-16
-    assert len(refine_times(equidistant_times(1.0, 11), steps).at) == 41
+    assert len(refine_times(equidistant_times(1.0, 11), steps).times) == 41
 
 
 def test_a_chart_sees_what_lies_between_even_times() -> None:

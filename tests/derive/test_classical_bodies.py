@@ -16,7 +16,7 @@ from mstmm.derive.classical.state_vector import PLANAR, SPATIAL
 from mstmm.derive.definition.derivation import Derivation, Equation, tilde
 from mstmm.derive.definition.notation import Matrix, explicit
 from mstmm.derive.equations import newton_euler as ne
-from mstmm.derive.equations.mass_distribution import of_tensor
+from mstmm.derive.equations.mass_distribution import from_inertia_tensor
 
 SPATIAL_KERNEL = kernel(body_spatial.derivation())
 PLANAR_KERNEL = kernel(body_planar.derivation())
@@ -94,10 +94,10 @@ def test_spatial_closed_form() -> None:
 def test_premises_are_the_integrated_laws() -> None:
     """Newton's and Euler's premise have the integrals of newton_euler on their left."""
     _, _, newton, euler = body_spatial.premises()
-    rdd, wd, _, _ = SPATIAL.at("I")
+    rdd, wd, _, _ = SPATIAL.end_blocks("I")
     inertia = body_spatial.INERTIA.as_explicit()
     symmetric = Matrix(3, 3, lambda i, j: inertia[min(i, j), max(i, j)])
-    body = of_tensor(body_spatial.MASS[0, 0], explicit(body_spatial.CENTER), symmetric)
+    body = from_inertia_tensor(body_spatial.MASS[0, 0], explicit(body_spatial.CENTER), symmetric)
     names = dict(zip((*ne.A0, *ne.OMEGADOT), (*explicit(rdd), *explicit(wd)), strict=True))
     names |= dict(zip(ne.OMEGA, explicit(body_spatial.OMEGA), strict=True))
     biases = {
@@ -144,8 +144,8 @@ def test_premises_that_leave_an_output_open_are_refused() -> None:
 
 
 def test_premises_must_be_linear_in_the_state() -> None:
-    rdd = PLANAR.at("I")[0]
+    rdd = PLANAR.end_blocks("I")[0]
     square = rdd * (rdd.T * rdd)
-    wrong = Equation("acceleration of the output end", PLANAR.at("O")[0], square)
+    wrong = Equation("acceleration of the output end", PLANAR.end_blocks("O")[0], square)
     with pytest.raises(ValueError, match="not linear"):
         body_planar.derivation((wrong, *body_planar.premises()[1:]))

@@ -19,7 +19,7 @@ from mstmm.derive.codegen.kernel_calls import (
 )
 from mstmm.derive.codegen.sweep_text import all_passes, function_text, sweep_files
 from mstmm.derive.schedule.differentiated_passes import D, DifferentiatedCall, ports_of
-from mstmm.derive.schedule.pass_steps import Call, Pass, Step, call, inner
+from mstmm.derive.schedule.pass_steps import Call, Pass, Step, all_steps, call
 from mstmm.derive.schedule.slot_definitions import CONSTANTS, ROLES, SLOTS, TRAITS
 from mstmm.derive.schedule.sweeps import SWEEPS
 from mstmm.ir import KernelIR
@@ -30,7 +30,7 @@ SPECS = stored_elements.generated_specs()
 def steps() -> Iterator[Step]:
     for whole in all_passes():
         for step in whole.steps:
-            yield from inner(step)
+            yield from all_steps(step)
 
 
 def calls() -> list[Call]:

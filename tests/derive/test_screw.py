@@ -19,12 +19,14 @@ from mstmm.ir import Assign, Constant, Element, KernelIR, Operand, Store, Tempor
 from mstmm.ir.graph import Graph, Node
 
 DIGITS = 40
-INPUTS = (screw_transport.TURN, screw_transport.SHIFT_ALONG)
+INPUTS = (screw_transport.ROTATION, screw_transport.SHIFT_ALONG)
 
 
 def motion(axis: str) -> Derivation:
     """Bias motion behind a screw, as the links have it."""
-    equations = screw_transport.screw_from_inputs(axis).behind(PARENT_MOTION.symbol, MOTION.symbol)
+    equations = screw_transport.screw_from_inputs(axis).outboard_motion(
+        PARENT_MOTION.symbol, MOTION.symbol
+    )
     return Derivation("screw", "motion", (*INPUTS, PARENT_MOTION), (MOTION,), equations)
 
 

@@ -54,7 +54,9 @@ def test_no_entry_goes_by_a_number(name: str, at: str) -> None:
     text = show_view(element_view(name), at)
     said = [line for line in text.splitlines() if not re.match(r"  +\S+ +\w+\[\d", line)]
     assert not re.search(r"\b(p|q|u|motion|motion_I|d_p)\[\d", "\n".join(said))
-    assert all(parameter.name in text for parameter in element_view(name).declared.own["p"])
+    assert all(
+        parameter.name in text for parameter in element_view(name).declared.parts_by_array["p"]
+    )
 
 
 def test_the_table_tells_what_stands_where() -> None:

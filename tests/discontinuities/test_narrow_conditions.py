@@ -200,7 +200,7 @@ def test_bounds_hold_between_two_looks(u: float) -> None:
 
     def look(t: float) -> Any:
         watched(t)
-        return system.see(t, state(t), np.array([u - 4 * t, -4.0]))
+        return system.read_numbers(t, state(t), np.array([u - 4 * t, -4.0]))
 
     n = len(EXPRESSIONS)
     for start, end in ((0.0, 0.01), (0.1, 0.4), (0.3, 1.1), (0.0, 1.0), (0.74, 0.76)):

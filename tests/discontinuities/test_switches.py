@@ -152,13 +152,13 @@ def test_a_run_is_cut_anywhere_bit_for_bit() -> None:
     run = make_run(systems[1], settings, *model.initial_state())
     rows = []
     while run.advance(0.0) is Status.RUNNING:
-        rows.append(run.take())
+        rows.append(run.take_samples())
         state = run.state()
         systems.append(SceneSystem(model.looped))
         run = make_run(systems[-1], settings, *model.initial_state())
         run.restore(state)
     assert whole.statistics.switch_crossings > 5 and len(rows) > 50
-    assert np.array_equal(Samples.joined([*rows, run.samples]).y, whole.samples.y)
+    assert np.array_equal(Samples.join([*rows, run.samples]).y, whole.samples.y)
     assert run.statistics == whole.statistics
 
 

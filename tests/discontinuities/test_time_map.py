@@ -142,6 +142,6 @@ def test_a_switch_at_the_start_is_a_break_there() -> None:
 
 def test_a_fixed_step_that_is_too_long_is_told() -> None:
     known = mapped("100*exp(-((t - 5.03)/0.005)^2)", 10.0)
-    told = str(known.too_long(0.1))
+    told = str(known.missed_feature_risk(0.1))
     assert "the fixed step of 0.1 s is too long for load, which near t = 5.0" in told
-    assert known.too_long(0.001) is None
+    assert known.missed_feature_risk(0.001) is None

@@ -27,7 +27,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def in_use(model: mstmm.Model, names: tuple[str, ...] = ()) -> bool:
-    return model._differentiations[names].tangents.compiled
+    return model._differentiations[names].tangents.uses_compiled_code
 
 
 def test_compiled_and_interpreted_agree(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,7 @@ def built(scene: dict[str, Any]) -> mstmm.Model:
     """A model that solves by code compiled for its scene."""
     model = mstmm.compile(mstmm.Scene(**scene))
     model._solver.build()
-    assert model._solver.compiled
+    assert model._solver.uses_compiled_code
     return model
 
 
@@ -178,11 +178,11 @@ def test_a_motion_without_inertia_is_named_by_both_engines() -> None:
 def test_the_compiler_waits_until_it_pays(monkeypatch: pytest.MonkeyPatch) -> None:
     model = mstmm.compile(mstmm.Scene(**ARM))
     model.solve([0.1, 0.2], np.eye(2))
-    assert not model._solver.compiled
+    assert not model._solver.uses_compiled_code
     monkeypatch.setattr(mass_matrix_solver, "_COMPILE_SECONDS", 0.0)
     monkeypatch.setattr(mass_matrix_solver, "_COMPILE_SECONDS_PER_PAIR", 0.0)
     model.solve([0.1, 0.2], np.eye(2))
-    assert model._solver.compiled
+    assert model._solver.uses_compiled_code
 
 
 def test_the_compiler_waits_longer_for_longer_code(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -31,8 +31,8 @@ def test_the_same_statements_in_an_order_that_can_be_computed(seed: int, order: 
     ordered = gather(kernel.statements)
     early = [s for level in ordered.levels for s in level.statements]
     angles = [a for level in ordered.levels for a in level.angles]
-    found = order(ordered.rest)
-    assert sorted(map(str, found)) == sorted(map(str, ordered.rest))
+    found = order(ordered.remaining)
+    assert sorted(map(str, found)) == sorted(map(str, ordered.remaining))
     known = {s.number for s in early} | {n for a in angles for n in (*a.sines, *a.cosines)}
     for statement in found:
         read = {a.number for a in operands(statement) if isinstance(a, Temporary)}

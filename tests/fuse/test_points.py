@@ -90,7 +90,7 @@ def machine() -> mstmm.Scene:
 def made(model: mstmm.Model) -> set[str]:
     """Parts of the scene's code that there are."""
     assert isinstance(model.fusion, Fusion)
-    return set(model.fusion.made)
+    return set(model.fusion.libraries)
 
 
 def test_compiled_code_serves_single_calls(rng: Generator, at_once: None) -> None:
@@ -144,7 +144,7 @@ def test_code_that_pays_serves_all_that_is_asked_of_its_body(
     model.positions(q, "c")
     assert "points 2" in made(model)
     kinematics = model._kinematics
-    assert not kinematics._asked and [kind for kind, _ in kinematics._calls] == ["places"]
+    assert not kinematics._request_counts and [kind for kind, _ in kinematics._calls] == ["places"]
     assert apart(model.jacobian_rate(q, u, "c"), before) < 1e-12
 
 

@@ -189,7 +189,9 @@ def _silent(result: Result, everything: bool) -> str:
                 continue
     bad = [name for name, values in numbers.items() if not np.isfinite(values).all()]
     said = " ".join(result.warnings)
-    told = result._observed.failures or any(word in said for word in ("finite", "overflow", "nan"))
+    told = result._observations.failures or any(
+        word in said for word in ("finite", "overflow", "nan")
+    )
     if not bad or told:
         return ""
     return bad[0].rsplit(".", 1)[-1]

@@ -38,7 +38,7 @@ def pending(mechanism: MechanismGraph, tree: Tree) -> list[set[int]]:
     groups = [(h, (mechanism.hinges[h].inboard, mechanism.hinges[h].outboard))
               for h in range(len(mechanism.hinges)) if h not in tree]  # fmt: skip
     first = len(mechanism.hinges)
-    groups += [(first + k, rows.ends) for k, rows in enumerate(mechanism.others)]
+    groups += [(first + k, rows.ends) for k, rows in enumerate(mechanism.constraint_groups)]
     found: list[set[int]] = [set() for _ in range(mechanism.bodies)]
     for group, ends in groups:
         for body in range(mechanism.bodies):
@@ -53,7 +53,9 @@ def work(mechanism: MechanismGraph, tree: Tree) -> int:
     first = len(mechanism.hinges)
     total = 0
     for groups in pending(mechanism, tree):
-        m = sum(mechanism.hinges[g].rows if g < first else mechanism.others[g - first].count
-                for g in groups)  # fmt: skip
+        m = sum(
+            mechanism.hinges[g].rows if g < first else mechanism.constraint_groups[g - first].count
+            for g in groups
+        )
         total += m * m + 3 * m
     return total

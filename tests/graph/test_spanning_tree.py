@@ -134,4 +134,4 @@ def test_ways_meet_where_their_bodies_have_both_behind_them() -> None:
         for one in ways:
             for other in ways:
                 first = next(body for body in one if body in other)
-                assert paths.meet(one[0], other[0]) == first
+                assert paths.common_ancestor(one[0], other[0]) == first

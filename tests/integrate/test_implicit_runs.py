@@ -67,12 +67,12 @@ def test_a_run_continues_bit_for_bit_from_every_step(lab: Lab, case: str, system
     run = make(lab).run(method, 1.5, start, **options)
     while run.advance(60.0, steps + 1) is Status.RUNNING:
         steps = run.statistics.steps
-        parts.append(run.take())
+        parts.append(run.take_samples())
         state, fresh = run.state(), make(lab)
         run = fresh.run(method, 1.5, start, **options)
         run.restore(state)
     assert run.status is Status.FINISHED
-    assert equal(Samples.joined([*parts, run.samples]), whole.samples)
+    assert equal(Samples.join([*parts, run.samples]), whole.samples)
     assert run.statistics == whole.statistics
     assert same_bits(run.y, whole.y)
 
@@ -99,12 +99,12 @@ def test_a_run_continues_bit_for_bit_from_within_a_step(lab: Lab, case: str) -> 
     while run.advance(0.0) is Status.RUNNING:
         inside += run.statistics.steps == before
         before = run.statistics.steps
-        parts.append(run.take())
+        parts.append(run.take_samples())
         state = run.state()
         run = hanging(lab).run(method, 0.3, start, capacity=2, **options)
         run.restore(state)
     assert inside > 2
-    assert equal(Samples.joined([*parts, run.samples]), whole.samples)
+    assert equal(Samples.join([*parts, run.samples]), whole.samples)
     assert run.statistics == whole.statistics
 
 

@@ -97,7 +97,7 @@ def test_quadratures_are_exact_to_their_degree() -> None:
     for name, degree in (("genalpha", 1), ("rodas4", 3), ("rodas5p", 5)):
         tableau = get(name)
         assert isinstance(tableau, (NewmarkFamily, Rosenbrock))
-        nodes = np.array([0.0, *tableau.inner, 1.0])
+        nodes = np.array([0.0, *tableau.inner_nodes, 1.0])
         for power in range(degree + 1):
             found = tableau.quadrature[:, 0] @ nodes**power
             assert found == pytest.approx(1 / (power + 1), rel=1e-14)

@@ -37,7 +37,7 @@ def step_by_step(run: Integrator, methods: list[str]) -> None:
     steps = 0
     while run.advance(60.0, steps + 1) is Status.RUNNING:
         steps = run.statistics.steps
-        run.change(get(methods[steps % len(methods)]))
+        run.switch_method(get(methods[steps % len(methods)]))
 
 
 @pytest.mark.parametrize("case", OUTPUTS)
@@ -69,16 +69,16 @@ def test_methods_in_turn_keep_events_outputs_and_breaks(lab: Lab, case: str) -> 
 def test_a_change_is_refused_where_it_makes_no_sense(lab: Lab) -> None:
     fixed = bouncing(lab).run("rk4", 1.2, START, step=0.01)
     with pytest.raises(SceneError, match='"dop853" cannot continue this run'):
-        fixed.change(get("dop853"))
+        fixed.switch_method(get("dop853"))
     adaptive = bouncing(lab).run("dop853", 1.2, START)
     with pytest.raises(SceneError, match='"rk4" cannot continue this run'):
-        adaptive.change(get("rk4"))
+        adaptive.switch_method(get("rk4"))
     without = lab.problem("harmonic", 2, 1.0).run("dop853", 1.2, START)
     with pytest.raises(SceneError, match="needs a tangent"):
-        without.change(get("rodas4p2"))
+        without.switch_method(get("rodas4p2"))
     assert without.advance(60.0) is Status.FINISHED
     with pytest.raises(SceneError, match="cannot continue this run"):
-        without.change(get("dopri5"))
+        without.switch_method(get("dopri5"))
 
 
 def test_a_state_of_a_changed_run_goes_on_bit_for_bit(lab: Lab) -> None:
@@ -88,13 +88,13 @@ def test_a_state_of_a_changed_run_goes_on_bit_for_bit(lab: Lab) -> None:
         return run
 
     whole = begun()
-    whole.change(get("rodas4p2"))
-    state, earlier = whole.state(), whole.take()
+    whole.switch_method(get("rodas4p2"))
+    state, earlier = whole.state(), whole.take_samples()
     assert whole.advance(60.0) is Status.FINISHED
     rest = bouncing(lab).run("dop853", 1.2, START)
     with pytest.raises(SceneError, match="another scene, method or version"):
         rest.restore(state)
-    rest.change(get("rodas4p2"))
+    rest.switch_method(get("rodas4p2"))
     rest.restore(state)
     assert rest.advance(60.0) is Status.FINISHED
     assert len(earlier.t) > 5 and equal(rest.samples, whole.samples)
@@ -105,23 +105,23 @@ def test_a_run_comes_back_for_signs_and_looks(lab: Lab) -> None:
     """An oscillation tied to one that is a thousand times faster and damped away."""
     problem = lab.problem("stiff_spring", 4, 1e3, 1.0)
     run = problem.run("dop853", 1.0, [1.0, 0.0, 1.0, 0.0], rtol=1e-4)
-    run.call_back(7)
+    run.request_return(7)
     assert run.advance(60.0) is Status.RUNNING and run.callback_requested
     assert run.signs == 7 <= run.statistics.stability_limited_steps
     assert run.last_step * 1e3 > 2.5
     steps = run.statistics.steps
-    run.call_back(0, look=steps + 11)
+    run.request_return(0, look=steps + 11)
     assert run.advance(60.0) is Status.RUNNING and run.callback_requested
     assert run.statistics.steps == steps + 11
-    run.call_back(0)
+    run.request_return(0)
     assert run.advance(60.0) is Status.FINISHED and not run.callback_requested
 
 
 def test_short_steps_of_implicit_methods_are_signs(lab: Lab) -> None:
     run = lab.mechanism("pendulum", 2e3, 5.0).run("rodas4p2", 1.5, (0.0, 0.4, 0, 0, 0), rtol=1e-9)
-    run.call_back(10, short_step=1.0)
+    run.request_return(10, short_step=1.0)
     assert run.advance(60.0) is Status.RUNNING and run.callback_requested and run.signs == 10
-    run.call_back(20, short_step=1e-9)
+    run.request_return(20, short_step=1e-9)
     assert run.advance(60.0) is Status.FINISHED and run.signs == 0
 
 
@@ -140,7 +140,7 @@ def test_a_run_without_a_next_step_goes_on_by_another_method(lab: Lab) -> None:
     assert run.advance(60.0) is Status.TANGENT_FAILED and run.no_step
     failed_at = run.t
     assert 0.5 < failed_at < 0.6
-    run.change(get("dop853"))
+    run.switch_method(get("dop853"))
     assert run.status is Status.RUNNING and not run.no_step and run.t == failed_at
     assert run.advance(60.0) is Status.FINISHED
     wanted = lab.mechanism("pendulum", 20.0, 0.5).solved(

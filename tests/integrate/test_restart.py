@@ -71,7 +71,7 @@ def test_a_saved_run_continues_bit_for_bit(lab: Lab, case: str) -> None:
     while True:  # a fresh run after every buffer, also in the middle of a step
         status = lab.lib.mstmm_advance(run._run, float("inf"))
         run._drain()
-        parts.append(run.take())
+        parts.append(run.take_samples())
         state = run.state()
         sizes.add(len(state["real"]))
         if status != Status.BUFFER_FULL:
@@ -79,7 +79,7 @@ def test_a_saved_run_continues_bit_for_bit(lab: Lab, case: str) -> None:
         run = bouncing(lab).run(method, 1.5, START, capacity=2, **options)
         run.restore(state)
     assert status == Status.FINISHED
-    assert equal(Samples.joined(parts), wanted)
+    assert equal(Samples.join(parts), wanted)
     assert run.statistics == reference.statistics
     assert len(sizes) == 2, sizes  # between steps little is kept, within a step everything
 
@@ -108,7 +108,7 @@ def test_another_process_continues_bit_for_bit(lab: Lab, tmp_path: Path) -> None
     run = bouncing(lab).run(method, 1.5, START, **options)
     while run.t < 0.8:
         run.advance(0.0)
-    first = run.take()
+    first = run.take_samples()
     state = run.state()
     np.savez(tmp_path / "state.npz", real=state["real"], integer=state["integer"])
     paths = [str(Path(__file__).parent), str(Path(__file__).parents[1]), *sys.path]

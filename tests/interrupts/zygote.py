@@ -85,7 +85,7 @@ def child(kill: dict[str, Any], count: mmap.mmap) -> None:
         os.dup2(handle, number)
     for each in SIGNALS:
         signal.signal(each, signal.SIG_IGN if each in kill["ignored"] else signal.SIG_DFL)
-    run_execution.CHECKPOINT_EVERY = integration_run.SLICE = kill["pace"]
+    run_execution.CHECKPOINT_INTERVAL = integration_run.SLICE = kill["pace"]
     signal_handling.exit_on_signal()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)  # what comes too early waits until here
     countdown = Countdown(kill["signal"], kill["at"], kill["every"], count)

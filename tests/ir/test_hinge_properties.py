@@ -52,13 +52,13 @@ def test_facts_of_the_built_in_hinges() -> None:
 
 def test_motion_at_the_start() -> None:
     alpha, lead = 1.1, 0.2
-    first, second = (r for _, r in builtin_hinges()["universal"].at_start([alpha]))
+    first, second = (r for _, r in builtin_hinges()["universal"].start_motion_columns([alpha]))
     assert first == pytest.approx((0, math.sin(alpha), math.cos(alpha)))
     assert second == (0, 0, 1)
-    ((along, about),) = builtin_hinges()["screw"].at_start([lead])
+    ((along, about),) = builtin_hinges()["screw"].start_motion_columns([lead])
     assert along == pytest.approx((0, 0, lead / (2 * math.pi))) and about == (0, 0, 1)
     with pytest.raises(ValueError, match="expected 1 parameters"):
-        builtin_hinges()["screw"].at_start()
+        builtin_hinges()["screw"].start_motion_columns()
 
 
 def test_stored_form() -> None:
@@ -81,7 +81,7 @@ def test_coordinates_that_fail_at_their_start() -> None:
     """Nothing is known there, and what asks says so instead of computing with it."""
     facts = odd((Assign(0, "div", (Constant("1"), Element("q", (0,)))),))
     assert facts.varies == ("q00000",) and not facts.constant_subspace and facts.straight
-    assert facts.at_start()[0][0][0] == math.inf
+    assert facts.start_motion_columns()[0][0][0] == math.inf
     hinge = Hinge(name="h", type="odd", inboard="ground", outboard="b")
     assert initial_motion_axes(hinge) is None  # not known yet
     vars(hinge)["facts"] = facts

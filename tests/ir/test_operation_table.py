@@ -100,7 +100,7 @@ def test_slope_is_that_of_the_value(row: Operation) -> None:
 def test_what_folding_takes_for_true_holds(row: Operation) -> None:
     if row.at_zero is not None:
         assert row.value(0.0) == row.at_zero, "at_zero"
-    if row.of_the_library and row.slope:
+    if row.is_c_library_function and row.slope:
         assert (row.at_zero is None) == (row.value(0.0) not in (0, 1)), "at_zero"
     if row.arity == 2:
         alike = all(row.value(a, b) == row.value(b, a) for a, b in points(row))

@@ -1,6 +1,6 @@
 """What a user meets: with any fault of compiler or cache, a scene gives right accelerations.
 
-The closed form of the pendulum says what is right; `engine_choice` says what happened.
+The closed form of the pendulum says what is right; `engine_reason` says what happened.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ def test_losses_of_all_that_is_elastic(of_mixed: Linear) -> None:
 
 def test_losses_of_some(of_mixed: Linear) -> None:
     """What one member loses is what its stiffness adds, tensions left as they are."""
-    only_shapes = of_mixed._of_shapes(lambda body: body.K)
+    only_shapes = of_mixed._modal_matrix(lambda body: body.K)
     check(of_mixed, lambda _: 0.3j * only_shapes, structural={"boom": 0.3})
     springs = of_mixed.K_springs
     check(of_mixed, lambda _: 0.2j * springs, structural={"stay": 0.2, "across": 0.2})

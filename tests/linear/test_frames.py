@@ -8,7 +8,7 @@ from linear.scenes import UNIT
 from scipy.optimize import brentq
 
 import mstmm
-from mstmm.runtime.linear.mode_count import Counting
+from mstmm.runtime.linear.mode_count import ModeCounter
 
 
 def spans(count: int) -> mstmm.Scene:
@@ -35,7 +35,7 @@ def test_no_mode_of_many_spans_is_missed(count: int, below: int) -> None:
     """Below beta = 6.5, where the determinant of transfer matrices changes its sign thousands of
     times: 2 n - 1, as many as finite elements and the exact dynamic stiffness count."""
     linear = mstmm.compile(spans(count), engine="looped").linearize(disturbances=())
-    assert Counting(linear.operators).below(6.5**4) == below
+    assert ModeCounter(linear.operators).count_below(6.5**4) == below
     if count <= 16:
         assert np.count_nonzero(linear.modes().omega < 6.5**2) == below
 

@@ -14,7 +14,7 @@ from scipy.special import jn_zeros
 import mstmm
 from mstmm.errors import NumericalFailure, SceneError
 from mstmm.runtime.linear import lanczos_iteration
-from mstmm.runtime.linear.mode_count import Counting
+from mstmm.runtime.linear.mode_count import ModeCounter
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -117,8 +117,8 @@ def test_springs_between_bodies_are_counted(stiffness: float) -> None:
     linear = of(tied(12, stiffness)).linearize(disturbances=())
     squares = np.sort(np.linalg.eigvals(np.linalg.solve(linear.M, linear.K)).real)
     edges = [squares[0] - 1, *(squares[1:] + squares[:-1]) / 2, 1.1 * squares[-1]]
-    counting = Counting(linear.operators)
-    assert [counting.below(edge) for edge in edges] == list(range(len(squares) + 1))
+    counting = ModeCounter(linear.operators)
+    assert [counting.count_below(edge) for edge in edges] == list(range(len(squares) + 1))
 
 
 def test_few_of_many_with_springs_between_are_complete() -> None:
@@ -143,7 +143,7 @@ def test_loads_that_follow_other_bodies_are_not_counted() -> None:
     scene = tied(6, 40.0).model_dump(by_alias=True, exclude_defaults=True)
     load = {"on": "b2", "force": ["3*h3.q", 0, 0]}
     linear = of(mstmm.Scene(**(scene | {"load": [load]}))).linearize(disturbances=())
-    assert Counting(linear.operators).below(10.0) is None
+    assert ModeCounter(linear.operators).count_below(10.0) is None
 
 
 #: Frequencies of a beam of length and mass per length 1 that hangs on a pin under 9.81 m/s2, by

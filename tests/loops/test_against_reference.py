@@ -29,7 +29,7 @@ def smallest_pivot(model: mstmm.Model, q: Any) -> float:
     if not model.loops.cut_hinges:
         return 1.0
     calls = LoopCalls(LoopedEngine(model.packed_scene), q)
-    calls.correction(calls.slip, q, np.zeros(model.nu))
+    calls.correction(calls.velocity_level, q, np.zeros(model.nu))
     return float((calls.pivots() / calls.mobility).min())
 
 

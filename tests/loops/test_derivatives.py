@@ -97,7 +97,7 @@ def test_those_of_linear_models() -> None:
     model = compiled(four_bar(laws=SPRINGS, tilt=OBLIQUE))
     linear = model.linearize()
     assert linear.constrained_motion is not None
-    along, places = linear.constrained_motion.ways, list(linear.free_speed_indices)
+    along, places = linear.constrained_motion.motion_basis, list(linear.free_speed_indices)
     found = model.derivatives(linear.state.q, linear.state.u)
     both = np.hstack([(found.q @ along)[places], (found.u @ along)[places]])
     assert worst(both, linear.A[1:]) < 1e-10

@@ -147,7 +147,7 @@ def test_runs_sessions_and_batches(both: tuple[mstmm.Model, mstmm.Model]) -> Non
     batch = fused.simulate_batch(
         (np.tile(q, (3, 1)), np.tile(u, (3, 1))), t_end=0.2, method="rk4", step=2e-3
     )
-    alone = looped.packed_scene.system.chosen  # rows that go by what a run remembers
+    alone = looped.packed_scene.system.inactive_row_indices  # rows that go by what a run remembers
     assert ("one after the other" if alone else "side by side") in batch.engine
     assert batch.success.all()
     assert np.abs(batch.q[:, -1] - wanted.q[-1]).max() < 1e-12

@@ -54,7 +54,7 @@ def test_a_crank_on_a_spring() -> None:
     assert abs(square / 35.3364900695893 - 1) < 3e-13
     assert abs(model.modes().omega[0] ** 2 - square) < 1e-10
     assert linear.constrained_motion is not None
-    without = (linear.K - linear.constrained_motion.turned)[0, 0] / linear.M[0, 0]
+    without = (linear.K - linear.constrained_motion.constraint_stiffness)[0, 0] / linear.M[0, 0]
     assert 0.01 < abs(without / square - 1) < 0.02
     assert linear.K_elastic[0, 0] == pytest.approx(30.0, rel=1e-13)
     whole = linear.K_elastic + linear.K_geometric + linear.K_load
@@ -89,7 +89,11 @@ def test_matrices_are_slopes_of_accelerations(platform: mstmm.Model) -> None:
     """By central differences between closed states."""
     linear = platform.linearize()
     assert linear.constrained_motion is not None
-    ways, places, size = linear.constrained_motion.ways, list(linear.free_speed_indices), 1e-4
+    ways, places, size = (
+        linear.constrained_motion.motion_basis,
+        list(linear.free_speed_indices),
+        1e-4,
+    )
     q, memory = linear.state.q, platform.looped.start_memory()
 
     def closed(x: Array) -> Array:

@@ -25,7 +25,8 @@ def looks(
     """Runs whose error is a function of the tolerance; they err all the same way."""
     tightest = error(rtols[-1])
     return [
-        ToleranceRun(rtol, kind, abs(error(rtol) - tightest), summed=10.0 * rtol) for rtol in rtols
+        ToleranceRun(rtol, kind, abs(error(rtol) - tightest), local_error_sum=10.0 * rtol)
+        for rtol in rtols
     ]
 
 
@@ -82,7 +83,10 @@ def test_motion_that_cannot_be_told_ends_at_the_tightest_tolerance() -> None:
 def test_runs_that_part_early_leap_no_farther_than_is_known(kind: Kind, leap: float) -> None:
     """Growth to the end at the pace of the first tenth is more than there is; and where implicit
     runs part early they do not follow a vibration, and nothing grows."""
-    found = [ToleranceRun(1e-3, kind, 2.0, 0.1, parted=0.1), ToleranceRun(1e-6, kind, 0.0, 1e-4)]
+    found = [
+        ToleranceRun(1e-3, kind, 2.0, 0.1, divergence_fraction=0.1),
+        ToleranceRun(1e-6, kind, 0.0, 1e-4),
+    ]
     assert next_rtol(found, 1e-6, kind) == pytest.approx(leap * 1e-6)
 
 

@@ -36,7 +36,7 @@ def test_an_undamped_one_lasts_to_the_end() -> None:
     found = seen(weight(5e3, 0.0), 10.0)
     assert found.rate == pytest.approx(50.0, rel=1e-6)
     assert found.radians(_ASKED) == pytest.approx(500.0, rel=1e-6)
-    assert found.speeding(_ASKED) == pytest.approx(500.0, rel=1e-6)
+    assert found.radians_above_speed(_ASKED) == pytest.approx(500.0, rel=1e-6)
 
 
 def test_a_damped_one_lasts_until_it_has_fallen_to_what_is_asked() -> None:
@@ -62,19 +62,19 @@ def test_an_angle_is_measured_in_rad() -> None:
     scene = mstmm.Scene(schema_version=1, gravity=[0.0, -9.81, 0.0], body=[rod], hinge=[pin])
     found = seen(mstmm.compile(scene, engine="looped"), 1.0)
     static = 9.81 * 0.5 / 1e5
-    assert found.parts.max() == pytest.approx(static / 2, rel=1e-3)
+    assert found.position_amplitudes.max() == pytest.approx(static / 2, rel=1e-3)
     assert found.fastest_damping == pytest.approx(0.0, abs=1e-6)
     assert found.radians(static) == 0.0
     assert found.radians(static / 3) == pytest.approx(found.rate, rel=1e-6)
-    assert found.left_behind(10) == found.parts.max()
-    assert found.left_behind(1000) == 0.0
+    assert found.unresolved_amplitude(10) == found.position_amplitudes.max()
+    assert found.unresolved_amplitude(1000) == 0.0
 
 
 def test_of_slow_motion_the_rate_alone_is_looked_up() -> None:
     found = seen(weight(5e3, 0.0), 10.0, few=501.0)
-    assert not found.known and found.rate == pytest.approx(50.0, rel=1e-6)
+    assert not found.has_motions and found.rate == pytest.approx(50.0, rel=1e-6)
     assert found.radians(_ASKED) == found.rate * found.span
-    assert not len(found.rates) and not np.any(found.parts)
+    assert not len(found.rates) and not np.any(found.position_amplitudes)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 import mstmm
-from mstmm.runtime.packing.load_coupling import Reach
+from mstmm.runtime.packing.load_coupling import LoadDependence
 from mstmm.runtime.packing.scene_packing import pack
 
 #: A chain of three and a branch from its middle: places 0, 1, 2 and 3.
@@ -15,7 +15,7 @@ BODIES = ("base", "arm", "hand", "flag")
 INBOARD = ("ground", "base.tip", "arm.tip", "arm.side")
 
 
-def reach(efforts: dict[str, str] | None = None, **tables: list[dict[str, Any]]) -> Reach:
+def reach(efforts: dict[str, str] | None = None, **tables: list[dict[str, Any]]) -> LoadDependence:
     rod = {"mass": 1.0, "inertia": [0.1, 0.1, 0.1], "ends": {"tip": [1, 0, 0], "side": [0, 1, 0]}}
     hinge = [
         {"name": f"to_{name}", "type": "pin", "inboard": inboard, "outboard": name,
@@ -25,11 +25,11 @@ def reach(efforts: dict[str, str] | None = None, **tables: list[dict[str, Any]])
     scene = mstmm.Scene(
         gravity=[0, 0, -9.81], body=[rod | {"name": name} for name in BODIES], hinge=hinge, **tables
     )
-    return pack(scene).written.reach
+    return pack(scene).written.load_dependence
 
 
 def test_no_loads() -> None:
-    assert reach() == Reach((), (), (), (), (), (), ())
+    assert reach() == LoadDependence((), (), (), (), (), (), ())
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_loads(
     load: dict[str, Any], own: bool, placed: tuple[int, ...], across: tuple[int, ...]
 ) -> None:
     found = reach(load=[load])
-    assert (found.loads, found.placed, found.across) == ((own,), placed, across)
+    assert (found.loads, found.own_load_bodies, found.coupled_bodies) == ((own,), placed, across)
 
 
 @pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_springs(
     spring: dict[str, Any], own: bool, placed: tuple[int, ...], across: tuple[int, ...]
 ) -> None:
     found = reach(spring=[spring])
-    assert (found.forces, found.placed, found.across) == ((own,), placed, across)
+    assert (found.forces, found.own_load_bodies, found.coupled_bodies) == ((own,), placed, across)
 
 
 @pytest.mark.parametrize(
@@ -86,11 +86,11 @@ def test_springs(
     ids=["another's axes", "by the state", "springs", "one by the state"],
 )  # fmt: skip
 def test_what_is_watched(tables: dict[str, Any], watched: list[set[int]]) -> None:
-    assert list(reach(**tables).watched) == watched
+    assert list(reach(**tables).load_sources) == watched
 
 
 def test_efforts_hear_what_they_read() -> None:
     """Of the values of a law those of the state count, by the bodies that they read."""
     found = reach({"flag": "sin(t)*to_base.u", "hand": "cos(t)", "arm": "u - 2*to_hand.q"})
     assert [speed for _, speed in found.efforts] == [1, 3]
-    assert found.heard == (frozenset({1, 2}), frozenset({0}))
+    assert found.effort_sources == (frozenset({1, 2}), frozenset({0}))

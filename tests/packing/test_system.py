@@ -145,7 +145,7 @@ def read(packed: PackedScene, place: int) -> dict[str, Any]:
 )  # fmt: skip
 def test_c_has_the_numbers_of_the_system(scene: mstmm.Scene) -> None:
     packed = pack(scene)
-    system, places = packed.system, packed.system.places
+    system, places = packed.system, packed.system.first_indices
     for k in range(system.count):
         body = system.body(k)
         assert read(packed, k) == {
@@ -156,7 +156,7 @@ def test_c_has_the_numbers_of_the_system(scene: mstmm.Scene) -> None:
             "parent": system.parents[k], "nu": body.nu, "release": body.release,
         }  # fmt: skip
     laws = [packed.model.laws[k] for k in range(packed.model.n_laws)]
-    said = [entry for run in system.laws for entry in run.each()]
+    said = [entry for run in system.laws for entry in run.iterate_laws()]
     assert len(laws) == len(said)
     for record, (law, place, twist, effort) in zip(laws, said, strict=True):
         assert (record.body, record.twist, record.n) == (place, twist, law.n)
@@ -167,7 +167,7 @@ def test_c_has_the_numbers_of_the_system(scene: mstmm.Scene) -> None:
 def test_places_follow_from_member_to_member() -> None:
     scene = mstmm.Scene(**chain(11))
     model = mstmm.compile(scene, engine="looped")
-    layout, places = model.coordinate_layout, model.packed_scene.system.places
-    assert (places["q"] == layout.q_places).all() and (places["u"] == layout.u_places).all()
+    layout, places = model.coordinate_layout, model.packed_scene.system.first_indices
+    assert (places["q"] == layout.q_starts).all() and (places["u"] == layout.u_starts).all()
     rows = model.packed_scene.system.rows(lambda body: body.nu)
     assert (np.diff([*places["u"], model.nu]) == rows).all()

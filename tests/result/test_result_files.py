@@ -50,7 +50,7 @@ def test_files_without_a_place_for_near_singular_poses(tmp_path: Path) -> None:
     scene["hinge"].append({"name": "ball", "type": "ball", "inboard": "coupler", "outboard": "bob",
                            "law": {"stiffness": [3.0, 3.0, 2.0]}})  # fmt: skip
     run = mstmm.compile(mstmm.Scene(**scene)).simulate(0.05)
-    memory, place = run.trajectory.memory, run.model.packed_scene.system.strained
+    memory, place = run.trajectory.memory, run.model.packed_scene.system.strain_index
     assert memory[-1, :place].any() and 0 < place < memory.shape[1] - 1
     data = run.to_xarray()
     data = data.isel(memory_place=np.arange(memory.shape[1]) != place)

@@ -11,10 +11,14 @@ import numpy as np
 import pytest
 
 import mstmm
-from mstmm.risk import AssessedAnswer, Risk
+from mstmm.risk import AssessedResult, Risk
 from mstmm.runtime.linear.linear_model import Linear
 from mstmm.runtime.model.model import Model
-from mstmm.runtime.risk_checks.answers import NOT_APPLICABLE, find_state_risks, merge_over_values
+from mstmm.runtime.risk_checks.state_risks import (
+    NOT_APPLICABLE,
+    find_state_risks,
+    merge_over_values,
+)
 
 ROOT = Path(mstmm.__file__).resolve().parents[1]
 
@@ -133,7 +137,7 @@ def test_answers_carry_a_verdict(name: str) -> None:
 def test_answers_of_linear_models_are_assessed() -> None:
     for name in ("modes", "frequency_response", "dynamic_stiffness_modes"):
         assert callable(getattr(Linear, name)) and name in ANSWERS
-    assert issubclass(Linear, AssessedAnswer)
+    assert issubclass(Linear, AssessedResult)
 
 
 # --- every check ---------------------------------------------------------------------------------

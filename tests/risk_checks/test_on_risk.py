@@ -81,7 +81,11 @@ def test_a_run_is_refused_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(mstmm.RiskRefused, match=r"before the run:\n  step-stability: step") as seen:
         model.simulate(1.0, method="rk4", step=0.05, on_risk="refuse")
     (risk,) = seen.value.risks
-    assert (risk.name, risk.element, risk.before) == ("step-stability", 'hinge "motor"', True)
+    assert (risk.name, risk.element, risk.seen_before_run) == (
+        "step-stability",
+        'hinge "motor"',
+        True,
+    )
     assert risk.figure > risk.limit and "use a step below" in risk.remedy
     assert seen.value.result is None
     assert isinstance(seen.value, mstmm.NumericalFailure)

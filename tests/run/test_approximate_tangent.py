@@ -154,11 +154,11 @@ def test_a_run_continues_bit_for_bit_from_every_step(
     parts, steps = [], 0
     while run.advance(60.0, steps + 1) is Status.RUNNING:
         steps = run.statistics.steps
-        parts.append(run.take())
+        parts.append(run.take_samples())
         state = run.state()
         run = fresh()
         run.restore(state)
-    found = Samples.joined([*parts, run.samples])
+    found = Samples.join([*parts, run.samples])
     assert np.array_equal(found.y, whole.samples.y)
     assert run.statistics == whole.statistics
     assert whole.statistics.approximate_tangents > 0

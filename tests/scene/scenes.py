@@ -75,4 +75,4 @@ def bladed(**changes: Any) -> Data:
 
 def is_chain(tree: Topology) -> bool:
     """Whether it is one unbranched chain from the ground."""
-    return all(run.parent == run.place - 1 for run in tree.runs)
+    return all(run.parent == run.position - 1 for run in tree.runs)

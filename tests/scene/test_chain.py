@@ -81,7 +81,7 @@ def test_a_chain_is_one_run_whatever_its_length() -> None:
         chain=[chain("rope", count=1000, inboard="base.tip"), chain("side", inboard="rope[7].tip")],
     )  # fmt: skip
     tree = topology.build_topology(scene)
-    assert [(run.body, run.count, run.place, run.parent) for run in tree.runs] == [
+    assert [(run.body, run.count, run.position, run.parent) for run in tree.runs] == [
         (1, 1, 0, -1), (2, 1000, 1, 0), (1002, 5, 1001, 8), (0, 1, 1006, 3),
     ]  # fmt: skip
     links = tree.links
@@ -90,9 +90,9 @@ def test_a_chain_is_one_run_whatever_its_length() -> None:
     assert links[8].children == (9, 1001) and links[3].children == (4, 1006)
     assert links[500].inboard_end == "tip" and links[500].parent == 499
     for place, link in enumerate(links):
-        assert tree.at(place) == (link.body, link.hinge)
-        assert tree.place_of_body(link.body) == tree.position[link.body] == place
-        assert tree.place_of_hinge(link.hinge) == place
+        assert tree.scene_indices(place) == (link.body, link.hinge)
+        assert tree.position_of_body(link.body) == tree.position[link.body] == place
+        assert tree.position_of_hinge(link.hinge) == place
     assert not is_chain(tree) and is_chain(topology.build_topology(Scene(**roped())))
 
 

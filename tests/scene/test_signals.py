@@ -63,12 +63,12 @@ def test_a_signal_stands_still_outside_its_times(interpolation: str) -> None:
     found = interpolate(TIMES, VALUES, interpolation)
     assert [found.value(t) for t in (-5.0, 0.0)] == [VALUES[0]] * 2
     assert [found.value(t) for t in (2.6, 50.0)] == [VALUES[-1]] * 2
-    assert found.at(50.0)[2:] == (0.0, 0.0, 0.0)
+    assert found.piece_at(50.0)[2:] == (0.0, 0.0, 0.0)
 
 
 def test_a_line_has_not_stopped_at_its_last_time() -> None:
     found = interpolate(TIMES, VALUES, "line")
-    assert found.at(2.5)[2] == pytest.approx(-0.25 / 1.2)
+    assert found.piece_at(2.5)[2] == pytest.approx(-0.25 / 1.2)
     assert found.value(2.5) == pytest.approx(0.25, abs=1e-15)
 
 
@@ -85,7 +85,7 @@ def test_jumps_are_found_among_the_knots() -> None:
 def test_rates_of_an_input_are_those_of_its_start() -> None:
     found = constant(1.0, 2.0, 6.0)
     assert [found.value(t) for t in (0.0, 1.0, 2.0)] == [1.0, 6.0, 17.0]
-    assert not found.varies and not found.stands and constant(1.0).stands
+    assert not found.varies and not found.is_constant and constant(1.0).is_constant
 
 
 # --- files ----------------------------------------------------------------------------------------

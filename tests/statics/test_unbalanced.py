@@ -10,8 +10,8 @@ import pytest
 
 import mstmm
 from mstmm.errors import NumericalFailure
-from mstmm.runtime.engine.statics.rest import Rest
-from mstmm.runtime.engine.statics.unbalanced import find_unbalanced_motion
+from mstmm.runtime.engine.statics.static_equilibrium import EquilibriumProblem
+from mstmm.runtime.engine.statics.unbalanced_loads import find_unbalanced_motion
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -85,11 +85,13 @@ def test_the_motion_is_that_of_the_constant_load() -> None:
     """Springs K with K (1, 2, 0) = 0 under f: f (1, 2, 0) is the work at every state."""
     across = np.array([[2.0, -1.0, 0.0], [0.0, 0.0, 1.0]])
     stiffness, load = across.T @ across, np.array([3.0, 1.0, 2.0])
-    problem = Rest(lambda q: stiffness @ q - load, lambda q, step: q + step, np.ones(3))
+    problem = EquilibriumProblem(
+        lambda q: stiffness @ q - load, lambda q, step: q + step, np.ones(3)
+    )
     found = find_unbalanced_motion(problem, np.zeros(3))
     assert found is not None
     np.testing.assert_allclose(found[0] / found[0][0], [1.0, 2.0, 0.0], atol=1e-6)
-    balanced = Rest(
+    balanced = EquilibriumProblem(
         lambda q: stiffness @ (q - [1.0, 1.0, 1.0]), lambda q, step: q + step, np.ones(3)
     )
     assert find_unbalanced_motion(balanced, np.zeros(3)) is None

@@ -74,13 +74,13 @@ def body_residual(
 
 def _start(body: ParticleBody, space: Space) -> Values:
     """The states at which the premises are linearised."""
-    v, turns = body.values, space.turns
+    v, turns = body.values, space.rotation_count
     none = mpmath.zeros(turns, 1)
     still = mpmath.zeros(body.rigid + body.modes, 1)
     angle = v["theta_p"] if space.planar else none
     start = {
         "r_I": v["r_p"], "r_O": v["r_p"] + body.arm(still), "q_O": v["q_p"],
-        "q_I": mpmath.zeros(space.shifts, 1), "m_O": v.get("m_p", none),
+        "q_I": mpmath.zeros(space.translation_count, 1), "m_O": v.get("m_p", none),
         "m_I": v.get("m_pI", none), f"{space.angle}_I": angle, f"{space.angle}_O": angle,
     }  # fmt: skip
     if body.modes:

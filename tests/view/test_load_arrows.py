@@ -47,7 +47,9 @@ def test_loads_are_quantities(run: Result) -> None:
 
 def test_arrows_go_with_their_loads(run: Result) -> None:
     stage = build_scene_graph(run, "loads", most=11)
-    force, moment = (next(b for b in stage.bent if b.name.startswith(x)) for x in ("forc", "mom"))
+    force, moment = (
+        next(b for b in stage.deforming_surfaces if b.name.startswith(x)) for x in ("forc", "mom")
+    )
     tail, tip = run.position("rod.tip"), force.vertices[:, -1]
     loads = run.quantity("jet.force").values
     unit = np.linalg.norm(tip[-1] - tail[-1]) / np.linalg.norm(loads[-1])
@@ -55,7 +57,7 @@ def test_arrows_go_with_their_loads(run: Result) -> None:
     away = np.linalg.norm(moment.vertices - np.array([0.0, 0.0, 0.0]), axis=2)
     assert away[0] == pytest.approx(np.zeros(len(away[0])), abs=1e-12)  # no moment yet
     assert away[-1, -1] == pytest.approx(2 * away[5, -1], rel=1e-9)
-    told = stage.told["loads/jet"]
+    told = stage.labels["loads/jet"]
     assert told.labels[:2] == (("force x", "N"), ("force y", "N"))
 
 
@@ -63,7 +65,7 @@ def test_a_force_at_a_mass_center_is_drawn_there() -> None:
     push = {"on": "rod", "at": "center_of_mass", "force": [0, 2.0, 0]}
     run = run_of(load=[push])
     stage = build_scene_graph(run, "loads", most=11)
-    (force,) = (one for one in stage.bent if one.name.startswith("forces"))
+    (force,) = (one for one in stage.deforming_surfaces if one.name.startswith("forces"))
     away = force.vertices[:, -1] - run.position("rod.tip") / 2
     assert np.abs(away[:, [0, 2]]).max() < 1e-9 and (away[:, 1] > 0).all()
 
@@ -99,7 +101,7 @@ def test_a_load_per_length_is_a_comb() -> None:
     run = run_of(body=[], beam=[beam], hinge=[pin], load=[wind])
     assert run.quantity("wind.force.y").values == pytest.approx(1.5 * 3 * run.t)
     stage = build_scene_graph(run, "comb", most=11)
-    [comb] = [bent for bent in stage.bent if bent.name == "forces/wind"]
+    [comb] = [bent for bent in stage.deforming_surfaces if bent.name == "forces/wind"]
     tips = comb.vertices[-1].reshape(7, -1, 3)[:, -1]
     tails = comb.vertices[-1].reshape(7, -1, 3)[:, 0]
     assert tails[-1] == pytest.approx(run.position("blade.tip")[-1], abs=1e-9)
@@ -114,7 +116,7 @@ def test_gravity_is_beside_everything_and_points_down(run: Result) -> None:
     assert tip - tail == pytest.approx([0, -np.linalg.norm(tip - tail), 0], abs=1e-12)
     rest = [solid for solid in stage.solids if solid is not arrow]
     assert arrow.surface.vertices[:, 0].max() < min(s.surface.vertices[:, 0].min() for s in rest)
-    assert stage.told["gravity"].text == ("9.81 m/s2",)
+    assert stage.labels["gravity"].text == ("9.81 m/s2",)
     floating = build_scene_graph(run_of(gravity=[0, 0, 0]), "floating", most=2)
     assert not [solid for solid in floating.solids if solid.owner == "gravity"]
 

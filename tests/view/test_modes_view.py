@@ -61,8 +61,8 @@ def test_loops_stay_closed() -> None:
     modes = mstmm.compile(mstmm.Scene(**CRANKS), engine="looped").linearize().modes()
     assert len(modes) == 1
     [(_, stage)] = modes.view(amplitude=0.2).parts
-    bar = stage.poses["bodies/bar"].of(np.array([[2.0, 0.5, 0]]))[:, 0]
-    right = stage.poses["bodies/right"].of(np.array([[0.0, 1.5, 0]]))[:, 0]
+    bar = stage.poses["bodies/bar"].inertial_points(np.array([[2.0, 0.5, 0]]))[:, 0]
+    right = stage.poses["bodies/right"].inertial_points(np.array([[0.0, 1.5, 0]]))[:, 0]
     assert np.ptp(bar, axis=0).max() > 0.3
     assert bar == pytest.approx(right, abs=1e-9)
 

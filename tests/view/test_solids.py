@@ -64,7 +64,7 @@ def test_joined_surfaces_keep_their_volumes() -> None:
     both = solid_meshes.join_surfaces(
         [
             solid_meshes.box_surface((1, 1, 1)),
-            solid_meshes.cylinder_surface(1.0, 1.0).placed((5, 0, 0)),
+            solid_meshes.cylinder_surface(1.0, 1.0).with_pose((5, 0, 0)),
         ]
     )
     assert volume(both) == pytest.approx(1.0 + polygon(solid_meshes.CORNERS_AROUND), rel=1e-13)

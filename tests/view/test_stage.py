@@ -32,7 +32,7 @@ def test_poses_between_samples_are_those_of_a_run_with_more() -> None:
 def test_a_tube_ends_where_the_beam_does() -> None:
     run = scenes.run()
     stage = build_scene_graph(run, "tube", most=21)
-    [tube] = stage.bent
+    [tube] = stage.deforming_surfaces
     around = 8
     tip = tube.vertices[:, -around:].mean(axis=1)
     fine = scenes.model().simulate(2.0, output_times=stage.times)
@@ -48,7 +48,7 @@ def test_springs_and_trails_meet_their_ends() -> None:
     assert coil.points[:, 0] == pytest.approx(np.tile([0.0, 0.0, 1.0], (11, 1)), abs=1e-12)
     assert coil.points[:, -1] == pytest.approx(fine.position("rod.ear"), abs=1e-5)
     assert trail.points[0, ::4] == pytest.approx(fine.position("rod.tip"), abs=1e-5)
-    assert len(trail.at(5, 11)) == 21
+    assert len(trail.points_at(5, 11)) == 21
 
 
 def test_bodies_with_shapes_are_drawn_by_them_alone() -> None:
@@ -161,7 +161,7 @@ def test_an_elastic_body_is_seen_by_its_mesh() -> None:
     model = mstmm.compile(scene, engine="looped")
     run = model.simulate(0.2, output_times=[0, 0.1, 0.2])
     stage = build_scene_graph(run, "link", most=3)
-    [seen] = [bent for bent in stage.bent if bent.name == "elastic/link"]
+    [seen] = [bent for bent in stage.deforming_surfaces if bent.name == "elastic/link"]
     a, b, c = np.moveaxis(seen.vertices[0][seen.faces], 1, 0)
     assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(0.5 * 0.04**2)
     assert np.ptp(seen.vertices[0], axis=0) == pytest.approx([0.5, 0.04, 0.04])
@@ -202,7 +202,7 @@ def test_pages_of_small_and_large_scenes_are_drawn_at_a_size_that_is_seen(size: 
     assert again.size == pytest.approx(10.0)
     pose, other = stage.poses["bodies/rod"], again.poses["bodies/rod"]
     assert other.position / again.size == pytest.approx(pose.position / stage.size)
-    assert again.told["bodies/rod"].values is stage.told["bodies/rod"].values
+    assert again.labels["bodies/rod"].values is stage.labels["bodies/rod"].values
 
 
 def test_the_rail_of_a_slide_stays_behind() -> None:

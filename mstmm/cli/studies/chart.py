@@ -130,7 +130,7 @@ def progress_callback(shown: ProgressBar, budget: float) -> Callable[[str], None
     def show(text: str) -> None:
         spent = min(time.monotonic() - start_time, budget)
         shown.label(text)
-        shown.share(spent / budget, f"{spent:.0f} of {budget:g} s")
+        shown.show_fraction(spent / budget, f"{spent:.0f} of {budget:g} s")
 
     return show
 

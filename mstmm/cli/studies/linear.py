@@ -23,7 +23,7 @@ from .linear_options import (
 
 if TYPE_CHECKING:
     from mstmm.array_validation import Array
-    from mstmm.risk import AssessedAnswer
+    from mstmm.risk import AssessedResult
     from mstmm.runtime.linear.linear_model import Linear
     from mstmm.runtime.linear.modes import Modes
 
@@ -67,7 +67,7 @@ def linearize(
     terminal.table_console().print(terminal.build_table("", head, rows[:_MAX_ROWS]))
     if len(rows) > _MAX_ROWS:
         terminal.print_lines(f"and {len(rows) - _MAX_ROWS} more")
-    options.say_where("all matrices: --output FILE.csv or .nc, or --json")
+    options.print_file_names("all matrices: --output FILE.csv or .nc, or --json")
 
 
 def _table_rows(linear: Linear) -> tuple[list[str], list[list[str]]]:
@@ -123,7 +123,7 @@ def modes(
     linear = options.linear(None)
     max_count = None if count is None or not len(linear) else min(count, len(linear))
     result = linear.modes(max_count, False if undamped else None)
-    options.show(result)
+    options.write_animation(result)
     if options.write_answer(result):
         return
     _print_assessment(result)
@@ -153,7 +153,7 @@ def modes(
     )
     if result.frame == "rotating":
         terminal.print_lines("frequencies are those of the rotating frame")
-    options.say_where("")
+    options.print_file_names("")
 
 
 def frf(
@@ -281,10 +281,10 @@ def frf(
     )
     if len(pairs) > _MAX_ROWS:
         terminal.print_lines(f"and {len(pairs) - _MAX_ROWS} more")
-    options.say_where("all values: --output FILE.csv or .nc, --plot FILE.png or --json")
+    options.print_file_names("all values: --output FILE.csv or .nc, --plot FILE.png or --json")
 
 
-def _print_assessment(answer: AssessedAnswer) -> None:
+def _print_assessment(answer: AssessedResult) -> None:
     """Print the verdict on an answer and its warnings."""
     from .. import terminal_output as terminal
 

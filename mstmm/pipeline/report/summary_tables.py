@@ -127,9 +127,9 @@ def mechanism_html(result: Result) -> str:
 
 def _loops_html(result: Result) -> str:
     """HTML of closed loops: cut hinges, rank, mobility and indeterminate loads."""
-    if result.model.closed is None:
+    if result.model.loop_start is None:
         return ""
-    loops = result.model.closed.loops
+    loops = result.model.loop_start.loops
     rows = [
         (
             "loops closed by",

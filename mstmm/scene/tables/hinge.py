@@ -25,7 +25,7 @@ class HingeTable(HingeKeys):
     """
 
     @model_validator(mode="after")
-    def _settle(self) -> Self:
+    def _apply_defaults(self) -> Self:
         for key, value in resolve_defaults(self).items():
             object.__setattr__(self, key, value)
         return self

@@ -36,8 +36,8 @@ _MAX_CONDITION = 1e8
 class IndependentSpeeds:
     """Independent speeds and motions of one packed scene with closed loops.
 
-    `free` are the indices of the speeds that are not prescribed, `sizes` (nu,) the characteristic
-    scales of the speeds.
+    `free_indices` are the indices of the speeds that are not prescribed, `sizes` (nu,) the
+    characteristic scales of the speeds.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class IndependentSpeeds:
         self._loops = closed.loops
 
     @cached_property
-    def places(self) -> tuple[int, ...]:
+    def indices(self) -> tuple[int, ...]:
         """Indices of the independent speeds, chosen at the initial state."""
         return self.select(self._start)
 
@@ -63,7 +63,7 @@ class IndependentSpeeds:
         scaled_motions = self._motions(q) / self.sizes[:, None]
         return tuple(sorted(select_rows(scaled_motions, self._free.tolist(), _SELECTION_RATIO)[0]))
 
-    def settling(
+    def select_fixed_speeds(
         self, q: Array, shapes: Sequence[int], kept: Sequence[int], wished: Sequence[int]
     ) -> tuple[tuple[int, ...], tuple[int, ...]]:
         """Choose speeds that fix a mechanism at q while `shapes` settle.
@@ -86,7 +86,7 @@ class IndependentSpeeds:
             sorted(select_rows(remaining, shapes, _SELECTION_RATIO)[0])
         )
 
-    def following(self, q: Array, places: Sequence[int]) -> Array:
+    def motion_matrix(self, q: Array, places: Sequence[int]) -> Array:
         """Matrix N (nu, n) of u = N v for the independent speeds v at the indices `places`.
 
         Raises NumericalFailure if these do not determine the others, as at a dead centre, and in
@@ -102,7 +102,7 @@ class IndependentSpeeds:
             and (not motion_count or np.linalg.cond(scaled_rows) < _MAX_CONDITION)
         ):
             return np.asarray(motions @ np.linalg.inv(motions[indices]))
-        self._refuse_open(q)
+        self._check_closed(q)
         names = ", ".join(self._calls.engine.packed.layout.u_name(k) for k in indices)
         raise NumericalFailure(
             f"the loops leave {motion_count} motions here, which {names or 'no speed'} cannot "
@@ -110,22 +110,25 @@ class IndependentSpeeds:
             "a dead centre or a singular pose; use a state near it"
         )
 
-    def _refuse_open(self, q: Array) -> None:
-        gaps = np.abs(self._calls.correction(self._calls.gap, q, np.zeros(len(self.sizes)))[1])
+    def _check_closed(self, q: Array) -> None:
+        gaps = np.abs(
+            self._calls.correction(self._calls.position_level, q, np.zeros(len(self.sizes)))[1]
+        )
         row = int(gaps.argmax())
         if gaps[row] > _MAX_GAP:
             raise NumericalFailure(
-                f"the loop that {self._calls.closing(row)} closes is open by {gaps[row]:.3g} at "
+                f"the loop that {self._calls.closing_label(row)} closes is open by "
+                f"{gaps[row]:.3g} at "
                 "this q; use that of model.assemble(q)"
             )
 
-    def driving(self, q: Array, speed: int) -> Array:
+    def prescribed_motion(self, q: Array, speed: int) -> Array:
         """All speeds (nu,) for a unit of one prescribed speed, with the other prescribed ones zero.
 
         nan if the loops do not permit that motion.
         """
-        motion = self._allowed(q, np.eye(1, len(self.sizes), speed)[0])
-        errors = self._slips(q, motion)[1]
+        motion = self._project(q, np.eye(1, len(self.sizes), speed)[0])
+        errors = self._correction_and_errors(q, motion)[1]
         return (
             motion
             if np.abs(errors).max(initial=0.0) < _MOTION_ROUNDING
@@ -134,19 +137,19 @@ class IndependentSpeeds:
 
     def move(self, q: Array, speeds: Array) -> Array:
         """Move q (nq,) by a small step along speeds (nu,); loops close to first order."""
-        return self._calls.moved(q, speeds)
+        return self._calls.move(q, speeds)
 
     @property
-    def free(self) -> list[int]:
+    def free_indices(self) -> list[int]:
         """Indices of the speeds that are not prescribed."""
         return list(map(int, self._free))
 
     @cached_property
-    def rows_of_speeds(self) -> frozenset[int]:
+    def speed_rows(self) -> frozenset[int]:
         """Rows that constrain only speeds: of rolling discs and of couplings of speeds."""
         records = self._calls.records
         speed_directions = {
-            closure.frame: closure.of_speeds
+            closure.frame: closure.speed_directions
             for closure in self._calls.engine.packed.system.closures
         }
         rows = {
@@ -157,13 +160,13 @@ class IndependentSpeeds:
             rows | {coupling.row for coupling in records.couplings if coupling.coupling.of_speeds}
         )
 
-    def without_slip(self, q: Array, u: Array) -> Array:
+    def remove_velocity_errors(self, q: Array, u: Array) -> Array:
         """Nearest speeds to u (nu,) that satisfy all rows; prescribed speeds are unchanged."""
-        return np.asarray(u + self._calls.correction(self._calls.slip, q, u)[0])
+        return np.asarray(u + self._calls.correction(self._calls.velocity_level, q, u)[0])
 
-    def slip(self, q: Array, u: Array) -> Array:
+    def velocity_errors(self, q: Array, u: Array) -> Array:
         """Velocity errors (rows,): J(q) u up to sign."""
-        return self._slips(q, u)[1]
+        return self._correction_and_errors(q, u)[1]
 
     def _motions(self, q: Array) -> Array:
         """Basis (nu, n) of the motions at q, orthonormal in characteristic scales."""
@@ -171,24 +174,24 @@ class IndependentSpeeds:
         random_generator = np.random.default_rng(0)
         trials = np.zeros((count, len(self.sizes)))
         trials[:, self._free] = random_generator.standard_normal((count, len(self._free)))
-        columns = [self._allowed(q, trial * self.sizes) for trial in trials]
+        columns = [self._project(q, trial * self.sizes) for trial in trials]
         scaled = np.reshape(columns, trials.shape).T / self.sizes[:, None]
         left_vectors, singular_values, _ = np.linalg.svd(scaled, full_matrices=False)
         is_kept = singular_values > _MOTION_ROUNDING * singular_values.max(initial=1.0)
         return np.asarray(left_vectors[:, is_kept] * self.sizes[:, None])
 
-    def _allowed(self, q: Array, speeds: Array) -> Array:
+    def _project(self, q: Array, speeds: Array) -> Array:
         """Speeds (nu,) projected on the constraints."""
-        return speeds + self._slips(q, speeds)[0]
+        return speeds + self._correction_and_errors(q, speeds)[0]
 
-    def _slips(self, q: Array, speeds: Array) -> tuple[Array, Array]:
+    def _correction_and_errors(self, q: Array, speeds: Array) -> tuple[Array, Array]:
         """Correction (nu,) of speeds and velocity errors (rows,), without those at rest.
 
         At rest the velocity errors are those of time-dependent couplings.
         """
-        correction, errors = self._calls.correction(self._calls.slip, q, speeds)
+        correction, errors = self._calls.correction(self._calls.velocity_level, q, speeds)
         rest_correction, rest_errors = self._calls.correction(
-            self._calls.slip, q, np.zeros_like(speeds)
+            self._calls.velocity_level, q, np.zeros_like(speeds)
         )
         return correction - rest_correction, errors - rest_errors
 

@@ -58,7 +58,7 @@ def find_skewed_axis(packed: PackedScene, least: float) -> str:
 
     Its angle is between `least` and 0.1 rad; empty if there is no such axis.
     """
-    scene, worst_skews = packed.described.skeleton, list[_Skew]()
+    scene, worst_skews = packed.user_scene.skeleton, list[_Skew]()
     plan = build_topology(scene).plan
     for cut in plan.cut if plan is not None else ():
         assert plan is not None

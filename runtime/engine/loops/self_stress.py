@@ -43,7 +43,7 @@ def find_indeterminate_loads(
 
     `calls` are those of a geometry in which all rows are satisfied.
     """
-    gaps = np.abs(calls.correction(calls.gap, q, np.zeros(calls.engine.nu))[1])
+    gaps = np.abs(calls.correction(calls.position_level, q, np.zeros(calls.engine.nu))[1])
     rounding = max(_RELATIVE_ROUNDING, _GAP_FACTOR * float(gaps.max(initial=0.0)))
     random_marks = [
         _loaded_components(calls, q, silent, seed, rounding) for seed in range(_RANDOM_STATES)
@@ -51,7 +51,7 @@ def find_indeterminate_loads(
     is_loaded, is_row_loaded = (np.any(marks, axis=0) for marks in zip(*random_marks, strict=True))
     packed, components_by_hinge = calls.engine.packed, dict[str, tuple[str, ...]]()
     for number, hinge in enumerate(packed.scene.hinges):
-        marks = is_loaded[packed.topology.place_of_hinge(number)]
+        marks = is_loaded[packed.topology.position_of_hinge(number)]
         components = tuple(
             component for component, mark in zip(_COMPONENTS, marks, strict=True) if mark
         )
@@ -65,7 +65,7 @@ def find_indeterminate_loads(
 def outboard_axes(calls: LoopCalls, place: int) -> Array:
     """Outboard axes (3, 3) of the hinge at a tree index, in internal axes of its body."""
     packed = calls.engine.packed
-    hinge = packed.scene.hinges[packed.topology.at(place)[1]]
+    hinge = packed.scene.hinges[packed.topology.scene_indices(place)[1]]
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
 
 
@@ -74,9 +74,9 @@ def _loaded_components(
 ) -> tuple[Array, Array]:
     """Masks of components (bodies, 6) and rows (rows,) loaded by a random self-stress state."""
     for row in range(calls.count):
-        calls.records.judge(row, np.inf if row in silent else 0.0)
+        calls.records.set_pivot_floor(row, np.inf if row in silent else 0.0)
     is_imposed = np.array(
-        [row not in silent and not calls.records.yields(row) for row in range(calls.count)]
+        [row not in silent and not calls.records.is_rotor_row(row) for row in range(calls.count)]
     )
     multipliers = (
         is_imposed * np.random.default_rng(seed).normal(size=calls.count) / np.sqrt(calls.mobility)

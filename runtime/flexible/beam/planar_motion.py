@@ -57,7 +57,7 @@ class PlanarMotionCheck:
             self._planes[key] = self._in_plane(n)
         return not self._planes[key]
 
-    def stay(self, beam: str, axis: int, hinges: Sequence[Hinge]) -> bool:
+    def is_planar(self, beam: str, axis: int, hinges: Sequence[Hinge]) -> bool:
         """Whether all motions of the hinges are planar, normal to axis 1 or 2 of the beam."""
         n = self._rotations[beam][:, axis]
         return all(self._is_hinge_planar(hinge, n) for hinge in hinges)

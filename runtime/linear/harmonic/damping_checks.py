@@ -20,7 +20,7 @@ def is_requested(damping: Losses | Ratios) -> bool:
     return not (isinstance(damping, int | float) and damping == 0)
 
 
-def refuse_in_motion(linear: LinearEquations, structural: Losses, modal: Ratios) -> None:
+def check_state_at_rest(linear: LinearEquations, structural: Losses, modal: Ratios) -> None:
     """Raise SceneError for structural or modal damping about a moving state."""
     if linear.state.u.any() and (is_requested(structural) or is_requested(modal)):
         raise SceneError(
@@ -29,7 +29,7 @@ def refuse_in_motion(linear: LinearEquations, structural: Losses, modal: Ratios)
         )
 
 
-def refuse_ratios(modal: Ratios) -> None:
+def reject_modal_damping(modal: Ratios) -> None:
     """Raise SceneError for modal damping ratios together with exact beams."""
     if is_requested(modal):
         raise SceneError(
@@ -38,9 +38,9 @@ def refuse_ratios(modal: Ratios) -> None:
         )
 
 
-def refuse_drives(pushes: Sequence[Channel], changed: bool) -> None:
+def reject_drives(pushes: Sequence[Channel], changed: bool) -> None:
     """Raise SceneError for drive motions if stiffness or inertia is `changed` from M, C, K."""
-    moved = next((one.name for one in pushes if one.moves), "")
+    moved = next((one.name for one in pushes if one.drive_factors), "")
     if changed and moved:
         raise SceneError(
             f'"{moved}": motions of drives do not go with structural damping and exact beams; '

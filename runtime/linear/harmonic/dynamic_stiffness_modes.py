@@ -20,11 +20,11 @@ import numpy as np
 
 from mstmm.array_validation import Array, Integers, integer
 from mstmm.errors import NumericalFailure, SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ...engine.harmonic_response import HarmonicResponse
 from ..modes import CHANNEL_RISKS
-from .exact_beams import Chosen, ExactBeams, exact_beams
+from .exact_beams import BeamSelection, ExactBeams, exact_beams
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -44,7 +44,7 @@ _SYMMETRIC = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicStiffnessModes(AssessedAnswer):
+class DynamicStiffnessModes(AssessedResult):
     """The k slowest undamped normal modes of a scene with exact beams, by rising omega.
 
     Attributes:
@@ -79,12 +79,14 @@ class DynamicStiffnessModes(AssessedAnswer):
         }  # fmt: skip
 
 
-def exact_modes(linear: LinearEquations, count: int, chosen: Chosen) -> DynamicStiffnessModes:
+def exact_modes(
+    linear: LinearEquations, count: int, chosen: BeamSelection
+) -> DynamicStiffnessModes:
     """Normal modes with exact beams; see `Linear.exact_modes`."""
     count = integer("count", count, 1, "a number of motions, 1 or more")
-    beams = exact_beams(linear, chosen, 0.0).undamped()
+    beams = exact_beams(linear, chosen, 0.0).without_damping()
     counter = _Counter(beams)
-    omega = counter.bisected(count)
+    omega = counter.natural_frequencies(count)
     others = ("shapes", *CHANNEL_RISKS)
     shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
     return DynamicStiffnessModes(
@@ -102,7 +104,7 @@ class _Counter:
         self.response = HarmonicResponse(
             engine, state.t, state.q, state.u, state.udot, exact=beams.bodies
         )  # fmt: skip
-        if self.response.tangent.coupled:
+        if self.response.tangent.off_tree_count:
             raise SceneError(
                 "exact modes: springs between bodies or loads that follow others reach across the "
                 "tree, where motions are not counted; take them out"
@@ -112,17 +114,17 @@ class _Counter:
                 "exact modes: loads follow the scene, so that its motions are not those of a "
                 "potential and cannot be counted; take them out, or ask for modes of shapes"
             )
-        self.response.undamped()
+        self.response.omit_damping()
         self.unit = beams.slowest
         size = sum(beam.size**2 for beam in beams.beams) + engine.nu
-        self.most = max(4, _BATCH // max(1, size))
+        self.max_batch = max(4, _BATCH // max(1, size))
 
     def below(self, omega: Array) -> Integers:
         """Mode count J (k,) below omega (k,), rad/s."""
-        parts = [omega[k : k + self.most] for k in range(0, len(omega), self.most)]
-        return np.concatenate([self._counted(part) for part in parts])
+        parts = [omega[k : k + self.max_batch] for k in range(0, len(omega), self.max_batch)]
+        return np.concatenate([self._count_modes(part) for part in parts])
 
-    def _counted(self, omega: Array) -> Integers:
+    def _count_modes(self, omega: Array) -> Integers:
         for beside in (*_BESIDE, 0.0):
             found = self.response.count_negative(-(omega**2))
             if (found >= 0).all():
@@ -130,7 +132,7 @@ class _Counter:
             omega = np.where(found < 0, omega * (1 + beside), omega)
         raise NumericalFailure(f"exact modes: near {omega[found < 0][0]:.9g} rad/s pivots vanish")
 
-    def bisected(self, count: int) -> Array:
+    def natural_frequencies(self, count: int) -> Array:
         """Natural frequencies omega (count,) of the slowest modes, rad/s."""
         low = _SLOWEST * self.unit
         if (self.response.count_negative(np.array([low**2])) > 0).any():

@@ -28,11 +28,11 @@ from ...flexible.beam.boundary_conditions import BeamEnvironment, boundary_condi
 from ...flexible.beam.dynamic_stiffness import BENDING, HarmonicBeam, harmonic_beam
 from ...flexible.kernel_inputs import transform_body
 from ...packing.scene_parameters import scene_data, scene_from_data
-from ..frozen_loads import standing
+from ..frozen_loads import with_frozen_loads
 from ..input_channels import GROUND, Channel, channel
 from ..mck_matrices import State
 from ..operating_point.friction import dry_friction
-from .hysteretic_damping import Losses, by_name
+from .hysteretic_damping import Losses, loss_factor_lookup
 
 if TYPE_CHECKING:
     from mstmm.scene.tables.beam import Beam
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
 #: Which beams are exact: all beams of the scene, none, or the named ones.
-Chosen = bool | Sequence[str]
+BeamSelection = bool | Sequence[str]
 
 #: Negligible deflection at rest, relative to the length; negligible stiffness due to tension,
 #: relative to the elastic stiffness.
@@ -64,19 +64,19 @@ class ExactBeams:
             tuple(positions[name] for name in self.names), self._stiffness
         )
 
-    def _each(self, of: Callable[[HarmonicBeam], Any]) -> list[Any]:
+    def _evaluate_beams(self, of: Callable[[HarmonicBeam], Any]) -> list[Any]:
         """Value of `of` for each beam, computed once for equal beams."""
         distinct = {id(beam): beam for beam in self.beams}
         found = {key: of(beam) for key, beam in distinct.items()}
         return [found[id(beam)] for beam in self.beams]
 
     def _stiffness(self, s: Complex) -> list[Complex]:
-        return self._each(lambda beam: beam.stiffness(s))
+        return self._evaluate_beams(lambda beam: beam.stiffness(s))
 
     def clamped_mode_count(self, omega: Array) -> Integers:
         """Number (k,) of clamped-clamped modes of all exact beams below omega (k,), rad/s."""
         return np.asarray(
-            sum(self._each(lambda beam: beam.clamped_mode_count(omega))), dtype=np.int64
+            sum(self._evaluate_beams(lambda beam: beam.clamped_mode_count(omega))), dtype=np.int64
         )
 
     @property
@@ -84,16 +84,16 @@ class ExactBeams:
         """Scale of the lowest frequency of the exact beams, rad/s."""
         return min(beam.frequency for beam in self.beams)
 
-    def undamped(self) -> ExactBeams:
+    def without_damping(self) -> ExactBeams:
         """The same model with undamped exact beams."""
-        return replace(self, beams=tuple(self._each(HarmonicBeam.undamped)))
+        return replace(self, beams=tuple(self._evaluate_beams(HarmonicBeam.without_damping)))
 
-    def named(self, coordinate: str) -> bool:
+    def has_coordinate(self, coordinate: str) -> bool:
         """Whether a coordinate belongs to an exact beam."""
         return coordinate.partition(".")[0] in self.names
 
 
-def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> ExactBeams:
+def exact_beams(linear: LinearEquations, chosen: BeamSelection, losses: Losses) -> ExactBeams:
     """Linear model with the `chosen` beams exact.
 
     Raises SceneError for names that are no flexible beams, and for beams and states outside the
@@ -115,15 +115,15 @@ def exact_beams(linear: LinearEquations, chosen: Chosen, losses: Losses) -> Exac
     for name in names:
         data = beam_data(tables[name])
         held = boundary_conditions(around, tables[name], data)
-        _refuse(tables[name], data, [held.x, *(end.x for end in held.ends)])
+        _check_beam(tables[name], data, [held.x, *(end.x for end in held.ends)])
     found = _with_ends_as_shapes(linear, names)
-    lossy = by_name(found.model, losses)
+    lossy = loss_factor_lookup(found.model, losses)
     beams = _distinct(found, tables, names, [lossy(name) for name in names])
-    _refuse_bent(found, linear, tables, names)
+    _check_straight(found, linear, tables, names)
     return ExactBeams(found, names, beams)
 
 
-def _names(model: CompiledScene, chosen: Chosen) -> tuple[str, ...]:
+def _names(model: CompiledScene, chosen: BeamSelection) -> tuple[str, ...]:
     flexible = [
         beam.name for beam in model.scene.beam if beam.name in model.coordinate_layout.modal
     ]
@@ -144,7 +144,7 @@ def _names(model: CompiledScene, chosen: Chosen) -> tuple[str, ...]:
     return tuple(dict.fromkeys(chosen))
 
 
-def _refuse(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
+def _check_beam(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
     """Raise SceneError for beam properties that the solution does not cover."""
     inner = [x for x in places if x not in (0.0, data.length)]
     problem = ""
@@ -219,7 +219,7 @@ def _distinct(
 # --- rest -----------------------------------------------------------------------------------------
 
 
-def _refuse_bent(
+def _check_straight(
     linear: LinearEquations, given: LinearEquations, tables: dict[str, Beam], names: Sequence[str]
 ) -> None:
     """Raise SceneError for beams that are bent or under axial load at rest."""
@@ -257,14 +257,14 @@ def _refuse_bent(
 def _stiffness(linear: LinearEquations, x: Array) -> Array:
     """Product K x for flexible bodies and loads frozen at the state, without laws and springs."""
     state = linear.state
-    tangent = TangentMatrix(standing(linear.model.looped, state))
+    tangent = TangentMatrix(with_frozen_loads(linear.model.looped, state))
     moved = tangent.rates(state.q, x)
     tangent.residual(state.t, state.q, state.u, state.udot)
     still = np.zeros(len(x))
     return tangent.slope(0.0, moved, still, still)
 
 
-def refuse_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
+def reject_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
     """Raise SceneError for distributed inputs on exact beams, which accept loads at ends only."""
     scene = beams.linear.model.scene
     loaded = any(
@@ -279,7 +279,7 @@ def refuse_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
             )
 
 
-def refuse_inner(beams: ExactBeams, names: Sequence[str]) -> None:
+def reject_inner_names(beams: ExactBeams, names: Sequence[str]) -> None:
     """Raise SceneError for inputs and outputs that exact beams do not provide.
 
     These are modal coordinates, and ends between root and tip.

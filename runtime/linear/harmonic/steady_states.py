@@ -18,7 +18,7 @@ from mstmm.safe_text import abbreviate_names
 from ..input_channels import Channel
 from ..operating_point.changes import MATRICES, find_changes
 from ..operating_point.departure import find_departure
-from ..operating_point.later import LaterStates
+from ..operating_point.later_states import LaterStates
 from ..outputs.output_rows import LinearQuantity
 from ..validity import changing_risk
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
 
 
-def refuse_turning(linear: LinearEquations) -> None:
+def reject_rotating_balls(linear: LinearEquations) -> None:
     """Raise SceneError for exact beams about a state with rotating balls: no matrices exist."""
     if linear.rate_matrix is not None:
         raise SceneError(
@@ -35,7 +35,7 @@ def refuse_turning(linear: LinearEquations) -> None:
         )
 
 
-def refuse_unsteady(
+def check_steady(
     linear: LinearEquations, pushes: Sequence[Channel], shown: Sequence[LinearQuantity]
 ) -> None:
     """Raise SceneError where matrices, inputs or outputs change along the motion."""
@@ -54,7 +54,7 @@ def refuse_unsteady(
         )
 
 
-def refuse_turning_outputs(linear: LinearEquations, shown: Sequence[LinearQuantity]) -> None:
+def check_steady_outputs(linear: LinearEquations, shown: Sequence[LinearQuantity]) -> None:
     """Raise SceneError for outputs that change along an otherwise steady motion.
 
     Unsteady motions are reported by the risks of the linear model instead.

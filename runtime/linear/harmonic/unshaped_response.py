@@ -55,7 +55,7 @@ def unshaped_response_risks(
         for name, body in linear.model.flexible_bodies.items()
         if (directions := [d for d in unshaped_directions(body) if d != "axial"])
     }
-    if not lacking or linear.carrying is not None:
+    if not lacking or linear.frame_transform is not None:
         return
     picked = np.unique(np.linspace(0, len(omega) - 1, _FREQUENCIES).astype(int))
     try:
@@ -102,12 +102,13 @@ def _with_shapes(
     assert isinstance(made, Linearisable)
     amplitudes = None if linear.dry is None else linear.dry.amplitudes
     return made.linearize(
-        _by_mode(state.q, "q_slice", model, made), _by_mode(state.u, "u_slice", model, made),
-        state.t, inputs=[one.name for one in inputs], friction=amplitudes,
+        _reorder_modes(state.q, "q_slice", model, made),
+        _reorder_modes(state.u, "u_slice", model, made), state.t,
+        inputs=[one.name for one in inputs], friction=amplitudes,
     )  # fmt: skip
 
 
-def _by_mode(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
+def _reorder_modes(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
     """Coordinates or speeds of `model` in the order of `made`, zero for added shape functions."""
     slices = [getattr(slots, part) for slots in model.coordinate_layout.modal.values()]
     hinges = min(one.start for one in slices)

@@ -14,7 +14,7 @@ from ..input_channels import Channel
 from ..outputs.linear_outputs import outputs_of, rows_of
 from ..outputs.output_rows import LinearQuantity
 from .departure import LARGEST
-from .later import LaterStates
+from .later_states import LaterStates
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -33,7 +33,7 @@ def find_changes(
 ) -> list[str]:
     """Names of inputs and outputs that change along the motion, and `MATRICES` if these do."""
     names, changing = [one.name for one in shown], dict[str, None]()
-    if not later.sparse:
+    if not later.compared_states:
         return []
     effects, rows = _effects(linear, pushes), _rows(linear, shown, pushes)
     for there in later.equations():
@@ -53,7 +53,7 @@ def _effects(linear: LinearEquations, pushes: Sequence[Channel]) -> list[Array]:
         return []
     efforts = np.zeros((len(pushes), linear.model.nu))
     efforts[:, list(linear.free_speed_indices)] = linear.input_matrix(pushes).T
-    found = HarmonicLoads.of(linear, pushes, efforts)
+    found = HarmonicLoads.from_efforts(linear, pushes, efforts)
     return [found.columns[found.parts[:, k] != 0] for k in range(len(pushes))]
 
 
@@ -65,12 +65,15 @@ def _rows(
     Each row has the factors of increments, rates and accelerations, of those of drives that are
     inputs, and the feedthrough of the inputs.
     """
-    places = [*linear.free_speed_indices, *(speed for one in pushes for speed, _ in one.moves)]
+    places = [
+        *linear.free_speed_indices,
+        *(speed for one in pushes for speed, _ in one.drive_factors),
+    ]
     found, none = [], np.zeros((1, linear.model.nu))
     for one in shown:
         rows = rows_of(linear, [one], pushes)
         orders = [rows.orders.get(order, none)[0, places] for order in range(3)]
-        found.append(np.concatenate([*orders, rows.through[0]]))
+        found.append(np.concatenate([*orders, rows.feedthrough[0]]))
     return found
 
 

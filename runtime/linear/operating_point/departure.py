@@ -12,7 +12,7 @@ from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
 from ...engine.characteristic_scales import scene_length, speed_scales, total_weight
-from .later import LaterStates
+from .later_states import LaterStates
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -33,7 +33,7 @@ class Departure:
 
     Attributes:
         coordinates: names of the departing coordinates.
-        worst: coordinate with the largest unbalanced effort.
+        worst_coordinate: coordinate with the largest unbalanced effort.
         effort, unit: that effort, N or N*m.
         t: its time (s).
         is_small: whether springs or gravity keep all of them near the state against a load far
@@ -41,14 +41,15 @@ class Departure:
     """
 
     coordinates: list[str]
-    worst: str
+    worst_coordinate: str
     effort: float
     unit: str
     t: float
     is_small: bool = False
 
     def __str__(self) -> str:
-        return f"{abs(self.effort):.4g} {self.unit} along {self.worst} at t = {self.t:.6g} s"
+        effort = f"{abs(self.effort):.4g} {self.unit}"
+        return f"{effort} along {self.worst_coordinate} at t = {self.t:.6g} s"
 
 
 def find_departure(linear: LinearEquations, later: LaterStates | None = None) -> Departure | None:
@@ -56,13 +57,13 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
 
     With `later`, states further along its motion are also checked.
     """
-    states = [linear.state, *(() if later is None else later.every)]
+    states = [linear.state, *(() if later is None else later.all_states)]
     free = list(linear.free_speed_indices)
     a = np.array([one.udot[free] for one in states]).T
     if not a.any():
         return None
     sizes = speed_scales(linear.model)[free]
-    leaves, efforts, distances = _leaving(linear, a, sizes)
+    leaves, efforts, distances = _departing_coordinates(linear, a, sizes)
     if not leaves.any():
         return None
     if leaves[:, 0].any():  # an immediate departure takes precedence
@@ -84,7 +85,7 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     )
 
 
-def _leaving(
+def _departing_coordinates(
     linear: LinearEquations, a: Array, sizes: Array
 ) -> tuple[NDArray[np.bool_], Array, Array]:
     """Departing coordinates, unbalanced efforts and distances for accelerations a (n, k).

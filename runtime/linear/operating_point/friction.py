@@ -41,7 +41,7 @@ _SLIDING = 10.0
 _KERNEL, _DAMPING, _COULOMB, _STATIC, _STRIBECK, _WIDTH = "full", 2, 3, 4, 5, 6
 
 
-class Rubbing(NamedTuple):
+class StickingFriction(NamedTuple):
     """Friction of one speed that does not slide.
 
     Attributes:
@@ -55,7 +55,7 @@ class Rubbing(NamedTuple):
     coulomb: float
     static: float
     damping: float
-    given: bool
+    is_given: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,18 +63,18 @@ class DryFriction:
     """Friction of the hinges of a model that do not slide, and its equivalent damping."""
 
     model: CompiledScene
-    rubbing: Mapping[int, Rubbing]
+    sticking: Mapping[int, StickingFriction]
     amplitudes: Amplitudes
 
     def __bool__(self) -> bool:
-        return bool(self.rubbing)
+        return bool(self.sticking)
 
-    def replaced(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
+    def replace_friction(self, laws: tuple[LawRun, ...]) -> tuple[LawRun, ...]:
         """Laws of the system of the model with viscous damping instead of this friction."""
-        first = self.model.packed_scene.system.places["u"]
+        first = self.model.packed_scene.system.first_indices["u"]
 
-        def change(law: LawNumbers, body: int) -> LawNumbers:
-            one = self.rubbing.get(int(first[body]) + law.speed)
+        def replace_law(law: LawNumbers, body: int) -> LawNumbers:
+            one = self.sticking.get(int(first[body]) + law.speed)
             if one is None or law.kernel != _KERNEL:
                 return law
             p = list(law.p)
@@ -82,21 +82,23 @@ class DryFriction:
             p[_COULOMB] = p[_STATIC] = 0.0
             return replace(law, p=tuple(p))
 
-        return tuple(law for run in laws for law in changed_laws(run, change))
+        return tuple(law for run in laws for law in change_laws(run, replace_law))
 
     def engine(self, model: CompiledScene) -> LoopedEngine:
         """Looped engine of the model, or of its variant with other parameters, with these laws."""
         packed = model.packed_scene
-        made = replace(packed.system, laws=self.replaced(packed.system.laws))
+        made = replace(packed.system, laws=self.replace_friction(packed.system.laws))
         return LoopedEngine(packed_system(made, packed))
 
 
-def changed_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
+def change_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
     """Yield a run of laws with `change` applied to each law and body index.
 
     The run keeps its pattern if all its repeats change equally; else each law becomes a run.
     """
-    every = [(change(law, body), body, twist, places) for law, body, twist, places in run.each()]
+    every = [
+        (change(law, body), body, twist, places) for law, body, twist, places in run.iterate_laws()
+    ]
     width = len(run.pattern)
     pattern = [law for law, _, _, _ in every[:width]]
     if all(law is pattern[k % width] or law == pattern[k % width]
@@ -117,27 +119,29 @@ def dry_friction(model: CompiledScene, u: Array, amplitudes: Amplitudes) -> DryF
     laws = [law for run in system.laws for law in run.pattern]
     if not any(law.kernel == _KERNEL and law.p[_STATIC] for law in laws) and amplitudes is None:
         return DryFriction(model, {}, None)
-    first = system.places["u"]
+    first = system.first_indices["u"]
     acting = {
         int(first[body]) + law.speed: law.p
-        for run in system.laws for law, body, _, _ in run.each()
+        for run in system.laws for law, body, _, _ in run.iterate_laws()
         if law.kernel == _KERNEL and law.p[_STATIC]
     }  # fmt: skip
     amplitude_of = _amplitudes(model, amplitudes, list(acting))
     found = {
-        speed: _rubbing(speed, p, amplitude_of(speed)) for speed, p in acting.items()
+        speed: _sticking_friction(speed, p, amplitude_of(speed)) for speed, p in acting.items()
         if speed in free and abs(u[speed]) <= _SLIDING * p[_WIDTH]
     }  # fmt: skip
     return DryFriction(model, found, amplitudes)
 
 
-def _rubbing(speed: int, p: tuple[float, ...], amplitude: float | None) -> Rubbing:
+def _sticking_friction(
+    speed: int, p: tuple[float, ...], amplitude: float | None
+) -> StickingFriction:
     coulomb, static = p[_COULOMB], p[_STATIC]
     if amplitude is None:
-        return Rubbing(speed, coulomb, static, 0.0, False)
+        return StickingFriction(speed, coulomb, static, 0.0, False)
     x = amplitude / p[_STRIBECK]
     level = coulomb + (static - coulomb) * float(dawsn(x)) / x
-    return Rubbing(speed, coulomb, static, 4 * level / (math.pi * amplitude), True)
+    return StickingFriction(speed, coulomb, static, 4 * level / (math.pi * amplitude), True)
 
 
 def _amplitudes(

@@ -30,7 +30,7 @@ from ...engine.observation_columns import (
 from ...packing.coordinate_layout import HingeSlots
 from ...result.sources.springs import SPRING_QUANTITIES, length_and_rate
 from ..input_channels import Channel
-from .output_rows import LinearQuantity, Part, formula, scaled
+from .output_rows import LinearQuantity, Part, formula, scale_parts
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -83,12 +83,12 @@ class QuantityLookup:
         if name in self._model.scene.channels:
             return self._input(name)
         if owner in self._layout.hinges:
-            found = self._of_hinge(self._layout.hinges[owner], last)
+            found = self._hinge_quantity(self._layout.hinges[owner], last)
             if found is not None:
                 return found
         if owner in self._springs and last in SPRING_QUANTITIES:
-            return self._of_spring(self._springs[owner], last)
-        return self._of_end(name, owner, last)
+            return self._spring_quantity(self._springs[owner], last)
+        return self._end_quantity(name, owner, last)
 
     def known_names(self) -> Iterator[str]:
         """Known names, coordinates first."""
@@ -113,7 +113,7 @@ class QuantityLookup:
 
     # --- hinges -----------------------------------------------------------------------------------
 
-    def _of_hinge(self, slots: HingeSlots, last: str) -> LinearQuantity | None:
+    def _hinge_quantity(self, slots: HingeSlots, last: str) -> LinearQuantity | None:
         """Coordinate, rate or acceleration of a hinge, by name or index; None if unknown."""
         state = self._state
         for k, speed in enumerate(slots.u_names):
@@ -152,16 +152,16 @@ class QuantityLookup:
 
     # --- ends -------------------------------------------------------------------------------------
 
-    def _of_end(self, name: str, owner: str, last: str) -> LinearQuantity | None:
+    def _end_quantity(self, name: str, owner: str, last: str) -> LinearQuantity | None:
         """Component of the motion of a body or end in inertial axes; None if unknown."""
         for kind, (push, order) in _KINDS.items():
             about, end = BODY_QUANTITIES[kind], owner.removesuffix(f".{kind}")
             for axis, short in enumerate(about.short):
                 long = end != owner and last == about.labels[axis]
                 if (long or (end == owner and last == short)) and end in self._ends:
-                    self._refuse_in_motion(name, order)
+                    self._check_at_rest(name, order)
                     end = self._ends.canonical(end) or end
-                    part = Part(order, push=Channel("", "", end=end, kind=push, axis=axis))
+                    part = Part(order, channel=Channel("", "", end=end, kind=push, axis=axis))
                     full = f"{end}.{kind}.{about.labels[axis]}"
                     return LinearQuantity(full, about.unit, (part,), self._number(end, kind, axis))
         return None
@@ -179,7 +179,7 @@ class QuantityLookup:
         )  # fmt: skip
         return found.points[0]
 
-    def _refuse_in_motion(self, name: str, order: int) -> None:
+    def _check_at_rest(self, name: str, order: int) -> None:
         if order and self._state.u.any():
             raise SceneError(
                 f'"{name}": the state moves, so that places change what speeds of ends are; ask '
@@ -188,15 +188,15 @@ class QuantityLookup:
 
     # --- springs ----------------------------------------------------------------------------------
 
-    def _of_spring(self, number: int, kind: str) -> LinearQuantity:
+    def _spring_quantity(self, number: int, kind: str) -> LinearQuantity:
         spring = self._model.scene.spring[number]
         name = f"{spring.name}.{kind}"
         if kind != "length":
-            self._refuse_in_motion(name, 1)
+            self._check_at_rest(name, 1)
         push = Channel("", "", spring=number)
         if kind != "effort":
             order = 0 if kind == "length" else 1
-            parts = (Part(order, push=push),)
+            parts = (Part(order, channel=push),)
             return LinearQuantity(
                 name, SPRING_QUANTITIES[kind].unit, parts, lambda: self._motion(number)[order]
             )
@@ -215,7 +215,7 @@ class QuantityLookup:
 
     def _effort(self, name: str, law: SpringLaw, number: int) -> LinearQuantity:
         """Effort of a spring: stiffness, damping and its effort expression."""
-        length, rate = (self._of_spring(number, kind) for kind in ("length", "length_rate"))
+        length, rate = (self._spring_quantity(number, kind) for kind in ("length", "length_rate"))
 
         def read(one: Name) -> LinearQuantity:
             if not one.hinge and one.quantity in ("q", "u"):
@@ -224,7 +224,7 @@ class QuantityLookup:
 
         given = formula(law.effort, name, SPRING_QUANTITIES["effort"].unit, read)
         springs, damps = (
-            scaled(one.parts, -x) for one, x in ((length, law.stiffness), (rate, law.damping))
+            scale_parts(one.parts, -x) for one, x in ((length, law.stiffness), (rate, law.damping))
         )
 
         def value() -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 
-from .figure import figure, finish_axes, refuse_none, write
+from .figure import figure, finish_axes, require_columns, write
 
 #: Largest number of curves with the legend inside the axes.
 _INSIDE = 4
@@ -50,7 +50,7 @@ def locus(
                          squeeze=False)[:, 0]  # fmt: skip
     for axis, (label, columns) in zip(axes, parts, strict=True):
         for k, (column, growth) in enumerate(zip(columns.T, growths.T, strict=True)):
-            axis.plot(x, column, lw=1.2, **_look(k))
+            axis.plot(x, column, lw=1.2, **_curve_style(k))
             axis.plot(x[growth > 0], column[growth > 0], ".", color="tab:red", ms=4, zorder=3)
         axis.set_ylabel(label)
     above = axes[0]
@@ -65,7 +65,7 @@ def locus(
             )  # fmt: skip
     above.set_ylim(0, 1.05 * top if top > 0 else None)
     for axis, (_, columns) in zip(axes, parts, strict=True):
-        _numbered(axis, x, columns, whirl)
+        _label_curves(axis, x, columns, whirl)
     for below in axes[1:]:
         below.axhline(0, color="0.7", lw=0.8)
     axes[-1].set_xlabel(parameter)
@@ -74,12 +74,12 @@ def locus(
     return made
 
 
-def _look(k: int) -> dict[str, Any]:
+def _curve_style(k: int) -> dict[str, Any]:
     """Colour and line style of curve `k`, distinct for 40 curves."""
     return {"color": f"C{k % 10}", "ls": _DASHES[k // 10 % len(_DASHES)]}
 
 
-def _numbered(axis: Any, x: Array, columns: Array, whirl: Array) -> None:
+def _label_curves(axis: Any, x: Array, columns: Array, whirl: Array) -> None:
     """Label every curve at its end with its mode number from 1, and F or B for its whirl.
 
     F is forward whirl, B backward whirl.  Labels too close to an earlier one are left out.
@@ -104,7 +104,7 @@ def _sense(whirl: float) -> str:
     return " F" if whirl > _WHIRLS else " B" if whirl < -_WHIRLS else ""
 
 
-def _named(made: Any, axis: Any, labels: Sequence[str]) -> None:
+def _add_legend(made: Any, axis: Any, labels: Sequence[str]) -> None:
     """Add a legend, outside the axes for many curves, none for a single unlabelled one."""
     if len(labels) > _INSIDE:
         made.legend(*axis.get_legend_handles_labels(), loc="outside right upper", fontsize=8,
@@ -121,19 +121,19 @@ def bode(
     path: str | Path | None,
 ) -> Any:
     """Plot magnitude and phase over frequency, Hz, for each column of `values` (k, curves)."""
-    refuse_none(values)
+    require_columns(values)
     made = figure(6.0)
     above, below = made.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     order = np.argsort(frequency, kind="stable")
     x = frequency[order]
     for k, (curve, label) in enumerate(zip(values[order].T, labels, strict=True)):
-        above.loglog(x, np.abs(curve), lw=1.2, label=label, **_look(k))
-        below.semilogx(x, np.degrees(np.unwrap(np.angle(curve))), lw=1.2, **_look(k))
+        above.loglog(x, np.abs(curve), lw=1.2, label=label, **_curve_style(k))
+        below.semilogx(x, np.degrees(np.unwrap(np.angle(curve))), lw=1.2, **_curve_style(k))
     above.set_ylabel(f"magnitude in {units}" if units else "magnitude")
     below.set_ylabel("phase in degrees")
     below.set_xlabel("frequency in Hz")
-    below.yaxis.set_major_locator(_every_right_angle())
-    _named(made, above, labels)
+    below.yaxis.set_major_locator(_right_angle_locator())
+    _add_legend(made, above, labels)
     finish_axes(above, below)
     write(made, path)
     return made
@@ -141,17 +141,17 @@ def bode(
 
 def nyquist(values: NDArray[Any], labels: Sequence[str], path: str | Path | None) -> Any:
     """Plot responses (k, curves) in the complex plane."""
-    refuse_none(values)
+    require_columns(values)
     made = figure(5.5)
     axis = made.subplots()
     for k, (curve, label) in enumerate(zip(values.T, labels, strict=True)):
-        axis.plot(curve.real, curve.imag, lw=1.2, label=label, **_look(k))
+        axis.plot(curve.real, curve.imag, lw=1.2, label=label, **_curve_style(k))
     axis.axhline(0, color="0.7", lw=0.8)
     axis.axvline(0, color="0.7", lw=0.8)
     axis.set_aspect("equal", adjustable="datalim")
     axis.set_xlabel("real part")
     axis.set_ylabel("imaginary part")
-    _named(made, axis, labels)
+    _add_legend(made, axis, labels)
     finish_axes(axis)
     write(made, path)
     return made
@@ -162,12 +162,12 @@ def unbalance(spin: Array, amplitude: Array, labels: Sequence[str], path: str | 
     made = figure(4.5)
     axis, order = made.subplots(), np.argsort(spin, kind="stable")
     for k, (curve, label) in enumerate(zip(amplitude[order].T, labels, strict=True)):
-        axis.plot(spin[order], curve, lw=1.2, label=label, **_look(k))
+        axis.plot(spin[order], curve, lw=1.2, label=label, **_curve_style(k))
     if (amplitude > 0).any():
         axis.set_yscale("log")
     axis.set_xlabel("spin in rad/s")
     axis.set_ylabel("whirl amplitude in m")
-    _named(made, axis, labels)
+    _add_legend(made, axis, labels)
     write(made, path)
     return made
 
@@ -190,7 +190,7 @@ def waterfall(
     return made
 
 
-def _every_right_angle() -> Any:
+def _right_angle_locator() -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(nbins=6, steps=[1, 1.8, 3, 4.5, 9, 10])

@@ -37,7 +37,7 @@ def write(made: Any, path: str | Path | None) -> None:
         made.savefig(temporary, dpi=150, format=path.suffix[1:].lower())
 
 
-def refuse_none(values: NDArray[Any]) -> None:
+def require_columns(values: NDArray[Any]) -> None:
     """Raise SceneError if `values` has no column to draw."""
     if not values.shape[1]:
         raise SceneError("nothing moves in this scene, so that there is nothing to draw")

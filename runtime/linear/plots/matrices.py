@@ -9,7 +9,7 @@ import numpy as np
 
 from mstmm.array_validation import Array
 
-from .figure import figure, refuse_none, write
+from .figure import figure, require_columns, write
 
 if TYPE_CHECKING:
     from ..state_space import StateSpace
@@ -30,7 +30,7 @@ def matrices(linear: StateSpace, path: str | Path | None) -> Any:
     drawn, names = (
         ("MCK", linear.coordinate_names) if linear.has_stiffness else ("A", linear.state_names)
     )
-    refuse_none(getattr(linear, drawn[0]))
+    require_columns(getattr(linear, drawn[0]))
     named = len(names) <= _NAMED
     side = float(np.clip(0.2 * len(names), 2.4, 6.0)) if named else 4.0
     made = figure(side + 1.6, len(drawn) * side + 2.4)

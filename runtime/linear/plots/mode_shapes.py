@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mstmm.array_validation import Array
 
-from .figure import figure, finish_axes, refuse_none, write
+from .figure import figure, finish_axes, require_columns, write
 from .wireframe import Outline, deformed_outlines
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def shapes(
     path: str | Path | None,
 ) -> Any:
     """Plot a panel for each mode of `which`: the scene at rest (grey, dashed) and displaced."""
-    refuse_none(shapes)
+    require_columns(shapes)
     columns = min(3, len(which)) if len(which) != 4 else 2
     rows = -(-len(which) // columns)
     made = figure(2.6 * rows + 0.3, 3.4 * columns if columns > 1 else 5.0)
@@ -49,14 +49,14 @@ def shapes(
     rest, moved = deformed_outlines(linear, np.real(shapes[:, list(which)]), _PART)
     for panel, k, one in zip(panels, which, moved, strict=False):
         _panel(panel, rest, one)
-        panel.set_title(f"{k + 1}: {described(complex(eigenvalues[k]))}", fontsize=9)
+        panel.set_title(f"{k + 1}: {eigenvalue_text(complex(eigenvalues[k]))}", fontsize=9)
     for panel in panels[len(which) :]:
         panel.set_visible(False)
     write(made, path)
     return made
 
 
-def described(value: complex) -> str:
+def eigenvalue_text(value: complex) -> str:
     """Text of frequency and damping ratio, or of growth rate, for an eigenvalue, 1/s."""
     if value == 0:
         return "0 Hz, moves freely"
@@ -123,15 +123,15 @@ def _plane(rest: Array, moved: Array) -> tuple[int, int]:
 
 def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     """Plot eigenvalues in the complex plane; unstable ones are red."""
-    refuse_none(values[None])
+    require_columns(values[None])
     made = figure(5.0)
     axis = made.subplots()
     growing = values.real > 0
     for some, colour in ((~growing, _BLUE), (growing, _RED)):
         axis.plot(values[some].real, values[some].imag, "x", color=colour, ms=7, mew=1.6)
     wide = _spread(values.imag) > _SPREAD
-    (_by_decades if wide else _widened)(axis, values.real, values.imag)
-    for k in _apart(axis, values[:_NUMBERED]):
+    (_use_log_axes if wide else _widen_limits)(axis, values.real, values.imag)
+    for k in _separate_indices(axis, values[:_NUMBERED]):
         place = values[k].real, values[k].imag
         axis.annotate(str(k + 1), place, xytext=(6, 3), fontsize=8, textcoords="offset points",
                       color="0.35")  # fmt: skip
@@ -151,7 +151,7 @@ def _spread(imaginary: Array) -> float:
     return float(positive.max() / positive.min()) if len(positive) else 1.0
 
 
-def _by_decades(axis: Any, real: Array, imaginary: Array) -> None:
+def _use_log_axes(axis: Any, real: Array, imaginary: Array) -> None:
     """Make both axes logarithmic, but linear below the decade of the smallest value."""
     slowest, least = _decade_below(imaginary[imaginary > 0]), _decade_below(np.abs(real[real != 0]))
     axis.set_xscale("symlog", linthresh=least)
@@ -165,7 +165,7 @@ def _decade_below(numbers: Array) -> float:
     return float(10.0 ** np.floor(np.log10(numbers.min(initial=1.0))))
 
 
-def _widened(axis: Any, real: Array, imaginary: Array) -> None:
+def _widen_limits(axis: Any, real: Array, imaginary: Array) -> None:
     """Set axis limits that include the imaginary axis."""
     top = max(float(imaginary.max(initial=0)), 0.0) or 1.0
     left, right = min(float(real.min()), 0.0), max(float(real.max()), 0.0)
@@ -174,7 +174,7 @@ def _widened(axis: Any, real: Array, imaginary: Array) -> None:
     axis.set_ylim(-0.04 * top, 1.08 * top)
 
 
-def _apart(axis: Any, values: Complex) -> list[int]:
+def _separate_indices(axis: Any, values: Complex) -> list[int]:
     """Indices of eigenvalues that do not overlap an earlier one in the plot."""
     places = (axis.transScale + axis.transLimits).transform(
         np.column_stack([values.real, values.imag])

@@ -84,7 +84,7 @@ def find_blades(linear: LinearEquations) -> list[Blades]:
             branch = _branch(linear, packed, child)
             if branch.coordinates:
                 by_form.setdefault(branch.form, []).append(branch)
-        groups = (_arranged(points, hub, group) for group in by_form.values())
+        groups = (_arrange_blades(points, hub, group) for group in by_form.values())
         found += [group for group in groups if group is not None]
     return found
 
@@ -95,7 +95,7 @@ def _branch(linear: LinearEquations, packed: PackedScene, root: int) -> _Branch:
     places = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
     for place in _outwards(packed, root):
         bodies.append(place)
-        body, hinge = packed.topology.at(place)
+        body, hinge = packed.topology.scene_indices(place)
         of_hinge = packed.layout.hinges.get(packed.scene.hinges[hinge].name)
         of_body = packed.layout.modal.get(packed.scene.bodies.name(body))
         for slots in (of_hinge, of_body):
@@ -125,7 +125,7 @@ def _mass_centres(linear: LinearEquations) -> Array:
     return np.asarray(engine.observe(*of, probes, parts=("points",)).points[0])
 
 
-def _arranged(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
+def _arrange_blades(points: Array, hub: int, group: list[_Branch]) -> Blades | None:
     """Branches ordered by azimuth about the spin axis of the hub; None if not equally spaced."""
     spin = points[hub, POINT_COLUMNS["angular_velocity"]]
     speed = float(np.linalg.norm(spin))

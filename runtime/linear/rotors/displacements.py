@@ -46,7 +46,7 @@ def whirl(linear: LinearEquations, shapes: NDArray[Any]) -> Array:
     and 0 is motion in a plane or along the axis.  Blades enter by the sum of their displacements,
     which is that of their common mass centre.
     """
-    axis = _spin(linear)
+    axis = _spin_axis(linear)
     rows = (displacements(linear, linear.state) @ shapes).reshape(2, -1, 3, shapes.shape[1])
     summed = _sum_of_blades(linear, rows).reshape(-1, 3, shapes.shape[1])
     turned = np.cross(np.conj(summed), summed, axis=1).imag
@@ -131,7 +131,7 @@ def _sections(body: ModalBody, frame: Array, rates: Array) -> Array:
     shapes = body.shapes
     assert shapes is not None
     x = _stations(body)
-    values, rotation = shapes.at(x), frame[:, 15:24].reshape(-1, 1, 3, 3)
+    values, rotation = shapes.values_at(x), frame[:, 15:24].reshape(-1, 1, 3, 3)
     found = np.repeat(frame[:, None], len(x), axis=1)
     arm = rotation[..., 0] * x[:, None]
     velocity, spin = POINT_COLUMNS["velocity"], POINT_COLUMNS["angular_velocity"]
@@ -167,7 +167,7 @@ def angular_velocity(linear: LinearEquations, name: str) -> Array:
     return np.asarray(points[0, 0, POINT_COLUMNS["angular_velocity"]])
 
 
-def _spin(linear: LinearEquations) -> Array:
+def _spin_axis(linear: LinearEquations) -> Array:
     """Unit vector (3,) of the largest angular velocity of a body; the x axis without spin."""
     turns = _points(linear, linear.state, linear.state.u[None])[
         0, :, POINT_COLUMNS["angular_velocity"]

@@ -26,9 +26,9 @@ from mstmm.errors import SceneError
 from mstmm.safe_text import abbreviate_names
 
 from .blades import find_blades
-from .carrying import Carrying
 from .displacements import displacements
-from .later import SAME, ahead, later
+from .frame_transform import FrameTransform
+from .later_equations import SAME, ahead, later
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -45,13 +45,13 @@ def frame_of(linear: LinearEquations) -> str:
 
 
 def _is_rotating(linear: LinearEquations) -> bool:
-    if linear.carrying is not None or not len(linear) or not linear.state.u.any():
+    if linear.frame_transform is not None or not len(linear) or not linear.state.u.any():
         return False
     now, then = (displacements(linear, state) for state in (linear.state, ahead(linear)))
     return bool(np.abs(then - now).max() > _ALIKE * np.abs(now).max(initial=0))
 
 
-def carrying_at(linear: LinearEquations) -> Carrying:
+def fixed_frame_transform(linear: LinearEquations) -> FrameTransform:
     """Transformation to the fixed frame at the operating point of a linear model.
 
     Raises SceneError with the reason where the rotor is not axisymmetric.
@@ -65,15 +65,15 @@ def carrying_at(linear: LinearEquations) -> Carrying:
         for places in group.coordinates.T:
             rates[np.ix_(places, places)] = group.rates
     if others.any():
-        turned = _turned(linear, there, np.flatnonzero(others))
+        turned = _later_rotation(linear, there, np.flatnonzero(others))
         rates[np.ix_(others, others)] = np.real(logm(turned)) / dt
     rates[np.abs(rates) < _ROUNDING * np.abs(rates).max(initial=0)] = 0.0
-    carrying = Carrying(np.eye(len(linear)), rates)
-    _refuse_asymmetric(replace(linear, carrying=carrying))
+    carrying = FrameTransform(np.eye(len(linear)), rates)
+    _check_constant_matrices(replace(linear, frame_transform=carrying))
     return carrying
 
 
-def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -> Array:
+def _later_rotation(linear: LinearEquations, there: LinearEquations, others: Integers) -> Array:
     """T (m, m) at the later state `there`, for the perturbations `others` (m,) outside blades."""
     now = displacements(linear, linear.state)[:, others]
     then = displacements(there, there.state)[:, others]
@@ -90,13 +90,13 @@ def _turned(linear: LinearEquations, there: LinearEquations, others: Integers) -
     return np.asarray(found / size[:, None])
 
 
-def _refuse_asymmetric(linear: LinearEquations) -> None:
+def _check_constant_matrices(linear: LinearEquations) -> None:
     """Raise SceneError where the matrices of y change along the motion."""
     there = later(linear)
     scale = 1 / np.sqrt(np.abs(np.diag(linear.M)))
     mass, stiff = (_largest(one, scale) for one in (linear.M, linear.K))
-    assert linear.carrying is not None
-    fastest = max(np.sqrt(stiff / mass), float(np.abs(linear.carrying.rates).max()))
+    assert linear.frame_transform is not None
+    fastest = max(np.sqrt(stiff / mass), float(np.abs(linear.frame_transform.rates).max()))
     for name, floor in (("M", mass), ("C", mass * fastest), ("K", mass * fastest**2)):
         one, other = (getattr(x, name) * np.outer(scale, scale) for x in (linear, there))
         rows = np.maximum(np.abs(one).max(axis=0), np.abs(one).max(axis=1))

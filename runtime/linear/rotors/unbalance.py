@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
-from mstmm.risk import AssessedAnswer, DeferredRisks, Risk
+from mstmm.risk import AssessedResult, DeferredRisks, Risk
 
 from ...engine.body_references import BodyReferences
-from ...risk_checks.answers import merge_over_values
+from ...risk_checks.state_risks import merge_over_values
 from .. import file_formats
 from .displacements import angular_velocity
 
@@ -28,7 +28,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class UnbalanceResponse(AssessedAnswer):
+class UnbalanceResponse(AssessedResult):
     """Whirl of points due to an unbalance m e that rotates with a body, in the fixed frame.
 
     Attributes:
@@ -133,7 +133,7 @@ def unbalance_response(
     places = [_end(models[0], name) for name in (at, *points)]
     axes = [angular_velocity(linear, at) for linear in models]
     spins = np.array([np.linalg.norm(axis) for axis in axes])
-    across = _across(axes[int(spins.argmax())])
+    across = _normal_vectors(axes[int(spins.argmax())])
     responses = [
         _response(linear, spin, places) for linear, spin in zip(models, spins.tolist(), strict=True)
     ]
@@ -162,7 +162,7 @@ def _end(linear: Linear, name: str) -> str:
     return ends.canonical(name) or name
 
 
-def _across(axis: Array) -> Array:
+def _normal_vectors(axis: Array) -> Array:
     """Unit vectors (2, 3) normal to an axis; with it they form a right-handed triad."""
     size = float(np.linalg.norm(axis))
     if not size:

@@ -135,23 +135,24 @@ class ToleranceRun:
         kind: kind of its method; of several methods explicit if all are.
         method: name of its method.
         distance: distance to the tightest run; 0 for that one, inf for other end times.
-        summed: sum of its local errors; None if the method computes none.
-        held: whether stability, not accuracy, limited many of its steps.
+        local_error_sum: sum of its local errors; None if the method computes none.
+        is_stability_limited: whether stability, not accuracy, limited many of its steps.
         growth: error relative to the sum of local errors, where it is better known than typically.
         radians: radians of vibration above the target error that implicit steps have to resolve.
         calm: whether vibration that explicit steps do not resolve is below the target error.
-        parted: share of the run after which it had diverged from the tightest one; 1 if never.
+        divergence_fraction: share of the run after which it had diverged from the tightest one; 1
+            if never.
     """
 
     rtol: float
     kind: Kind
     distance: float
-    summed: float | None
-    held: bool = False
+    local_error_sum: float | None
+    is_stability_limited: bool = False
     radians: float = 0.0
     calm: bool = False
     growth: float | None = None
-    parted: float = 1.0
+    divergence_fraction: float = 1.0
     method: str = ""
 
     def compared_with(self, distances: Array) -> ToleranceRun:
@@ -160,7 +161,7 @@ class ToleranceRun:
             return replace(self, distance=math.inf)
         diverged = np.flatnonzero(~(distances < _PARAMETERS[self.kind].divergence))
         parted = float(diverged[0]) / max(len(distances) - 1, 1) if len(diverged) else 1.0
-        return replace(self, distance=float(distances.max()), parted=parted)
+        return replace(self, distance=float(distances.max()), divergence_fraction=parted)
 
 
 def first_rtol(target: float, kind: Kind, radians: float = 0.0) -> float:
@@ -190,7 +191,10 @@ def estimate_error(runs: Sequence[ToleranceRun]) -> float | None:
     if before.distance < parameters.divergence:
         is_constant = last.calm and before.calm and last.rtol >= 0.99 * _MIN_CALM_STEP * before.rtol
         return error * (1.0 if is_constant else reduction)
-    if before.kind is last.kind is Kind.EXPLICIT and _LATE_DIVERGENCE <= before.parted < 1.0:
+    if (
+        before.kind is last.kind is Kind.EXPLICIT
+        and _LATE_DIVERGENCE <= before.divergence_fraction < 1.0
+    ):
         return min(error, _GROWTH_SAFETY * last.rtol * _error_growth(before))
     return error
 
@@ -208,7 +212,7 @@ def next_rtol(runs: Sequence[ToleranceRun], target: float, kind: Kind) -> float:
         max_factor = _MAX_FIRST_STEP
     elif not runs[-2].distance < _PARAMETERS[kind].divergence:
         factor = _MAX_DIVERGED_STEP
-        if kind is Kind.EXPLICIT and runs[-2].parted < 1.0:
+        if kind is Kind.EXPLICIT and runs[-2].divergence_fraction < 1.0:
             factor = min(
                 max(_rtol_without_divergence(runs[-2], target) / last.rtol, _MIN_DIVERGED_STEP),
                 _MAX_DIVERGED_STEP,
@@ -244,7 +248,7 @@ def _rtol_without_divergence(before: ToleranceRun, target: float) -> float:
 def _error_growth(run: ToleranceRun) -> float:
     """Growth of errors over the whole time, at the rate until a run had diverged."""
     ratio = max(_PARAMETERS[run.kind].divergence / run.rtol, 1.0)
-    return float(ratio ** (1.0 / max(run.parted, 0.1)))
+    return float(ratio ** (1.0 / max(run.divergence_fraction, 0.1)))
 
 
 def _rtol_of_other_kind(
@@ -281,8 +285,8 @@ def no_gain_reason(runs: Sequence[ToleranceRun]) -> str:
 def _error_by_local_errors(run: ToleranceRun) -> float:
     """Estimated error of a run from its local errors."""
     parameters = _PARAMETERS[run.kind]
-    local_sum = run.summed or _SUM_PER_RTOL * run.rtol
-    growth = parameters.limited_growth if run.held else parameters.growth
+    local_sum = run.local_error_sum or _SUM_PER_RTOL * run.rtol
+    growth = parameters.limited_growth if run.is_stability_limited else parameters.growth
     return local_sum * (run.growth or growth + _GROWTH_PER_RADIAN * run.radians)
 
 

@@ -128,7 +128,9 @@ class ToleranceSearch:
     def _make_run(self, method: str, rtol: float) -> Trajectory | None:
         """Make one run; return it if it did not reach its end."""
         rtol, atol = _round_tolerance(rtol), _round_tolerance(_ATOL_PER_RTOL * rtol)
-        max_steps = self._settings.max_steps if self._completed else self._family.most_steps(method)
+        max_steps = (
+            self._settings.max_steps if self._completed else self._family.max_first_steps(method)
+        )
         settings = replace(
             self._settings, rtol=rtol, atol=atol, method=method, max_steps=max_steps,
             first_step=self._first_step(),
@@ -192,8 +194,8 @@ class ToleranceSearch:
         if last.kind is not Kind.EXPLICIT:
             return None
         if self._model.flexible_bodies and isinstance(self._measure, Coordinates):
-            self._measure.scale_by(last.numbers)
-            growth = min(_GROWTH_LENGTH / self._measure.least, _MAX_SHAPE_GROWTH)
+            self._measure.set_scales(last.numbers)
+            growth = min(_GROWTH_LENGTH / self._measure.min_scale, _MAX_SHAPE_GROWTH)
             return growth * (_DAMPED_SHARE if damps_own_errors(last.run) else 1.0)
         is_unresolved = self._family.leaves(last.run) and not self._model.flexible_bodies
         return _GROWTH_OF_SPEEDS if is_unresolved else None
@@ -207,7 +209,7 @@ class ToleranceSearch:
         n = min(len(run.numbers), len(tightest.numbers))
         if not n or abs(len(run.numbers) - len(tightest.numbers)) > 1:
             return np.zeros(0)
-        self._measure.scale_by(tightest.numbers)
+        self._measure.set_scales(tightest.numbers)
         return self._measure.distance(run.numbers[:n], tightest.numbers[:n]) / self._motion_size
 
     def _run_progress(self) -> Progress | None:
@@ -253,7 +255,7 @@ class ToleranceSearch:
 
     def _first_setting(self) -> tuple[str, float]:
         """Method and tolerance of the first run."""
-        kind = self._family.begins
+        kind = self._family.first_kind
         rtol = first_rtol(self._request.error, kind, self._family.radians)
         return self._family.method(kind, rtol, ()), rtol
 
@@ -262,7 +264,7 @@ class ToleranceSearch:
         target, before = self._request.error / self._motion_size, self._tolerance_runs[-1].kind
         rtol = next_rtol(self._tolerance_runs, target, before)
         made = [completed.run for completed in self._completed]
-        kind = self._family.next(rtol, target, made)
+        kind = self._family.next_kind(rtol, target, made)
         if kind is not before:
             rtol = next_rtol(self._tolerance_runs, target, kind)
         return self._family.method(kind, rtol, made), rtol

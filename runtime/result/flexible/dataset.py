@@ -69,10 +69,10 @@ def _shape_variables(name: str, body: ModalBody) -> dict[str, Variable]:
     shapes = body.shapes
     assert shapes is not None
     x = np.linspace(0.0, shapes.length, STATION_COUNT)
-    values, station, modes = shapes.at(x), f"{name}_x", f"{name}_mode"
+    values, station, modes = shapes.values_at(x), f"{name}_x", f"{name}_mode"
     second_order = np.zeros((len(x), 3, body.n, body.n))
     if shapes.stiffening:
-        second_order = shapes.second_order.at(x)[:, :3]
+        second_order = shapes.second_order.field_at(x)[:, :3]
     words = np.array(body.modes, dtype=object)
     return {
         station: ((station,), x, _attributes("m", f"place along {name}")),

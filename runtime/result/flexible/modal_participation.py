@@ -50,8 +50,8 @@ def _tree_participation(
     flexible: FlexibleBodies, model: CompiledScene, q: Array
 ) -> dict[str, Array]:
     inertia, tree, result = model.looped.mass_matrix(q), _Tree(model), dict[str, Array]()
-    for name in flexible.known:
-        hinge_speeds, outboard_speeds = tree.hinge_of(name)
+    for name in flexible.modal_bodies:
+        hinge_speeds, outboard_speeds = tree.moving_hinge(name)
         if hinge_speeds:
             result |= _participation_row(
                 name, inertia, hinge_speeds, _modal_speed_indices(model, name), outboard_speeds
@@ -66,15 +66,15 @@ def _loop_participation(
     assert model.independent_speeds is not None
     result, shapes = (
         dict[str, Array](),
-        {name: _modal_speed_indices(model, name) for name in flexible.known},
+        {name: _modal_speed_indices(model, name) for name in flexible.modal_bodies},
     )
     modal_speeds = [k for modes in shapes.values() for k in modes]
-    hinges, free_speeds = model.independent_speeds.settling(q, modal_speeds, (), ())
+    hinges, free_speeds = model.independent_speeds.select_fixed_speeds(q, modal_speeds, (), ())
     if not hinges or {*free_speeds} != {*modal_speeds}:
         return {}
     speed_indices, hinge_indices = (*hinges, *modal_speeds), list(range(len(hinges)))
-    motions = model.independent_speeds.following(q, speed_indices)
-    inertia = np.asarray(model.looped.required_by_inertia(q, motions.T) @ motions)
+    motions = model.independent_speeds.motion_matrix(q, speed_indices)
+    inertia = np.asarray(model.looped.mass_matrix_product(q, motions.T) @ motions)
     for name, modes in shapes.items():
         result |= _participation_row(
             name, inertia, hinge_indices, [speed_indices.index(k) for k in modes], []
@@ -147,7 +147,7 @@ class _Tree:
                 first + k for k in range(last - first) if k >= len(drive) or drive[k] is None
             ]
 
-    def hinge_of(self, body: str) -> tuple[list[int], list[int]]:
+    def moving_hinge(self, body: str) -> tuple[list[int], list[int]]:
         """Speeds of the nearest moving hinge inboard of a body, and of all outboard of it."""
         while body in self.inboard and not self.speeds[body]:
             body = self.inboard[body]

@@ -112,7 +112,7 @@ class ModelRange:
 
 def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
     """Ranges, one per flexible body; empty for runs without samples and for too many bodies."""
-    if not len(flexible.run.t) or not 0 < len(flexible.known) <= MAX_BODIES:
+    if not len(flexible.run.t) or not 0 < len(flexible.modal_bodies) <= MAX_BODIES:
         return ()
     shares = participation_by_body(flexible)
     welded_lines = beam_lines(flexible.model.scene)
@@ -123,7 +123,7 @@ def model_ranges(flexible: FlexibleBodies) -> tuple[ModelRange, ...]:
             shares.get(name),
             welded_lines[name].length if name in welded_lines else None,
         )
-        for name in flexible.known
+        for name in flexible.modal_bodies
     )
 
 
@@ -238,7 +238,7 @@ def _section_estimates(
     directions without shape functions.
     """
     motion = flexible.motion(name).some(some)
-    inboard_x = flexible.held_place(name)
+    inboard_x = flexible.inboard_position(name)
     x, weights = quadrature_rule(motion.shapes, inboard_x)
     points = [p.some(some) for p in flexible.point_loads(name)]
     lines = [line.some(some) for line in flexible.line_loads(name)]
@@ -282,21 +282,21 @@ def missed_deflection(flexible: FlexibleBodies, name: str, some: NDArray[np.int6
     where these are strained most; None without any.
     """
     motion = flexible.motion(name).some(some)
-    truncation, inboard_end = motion.body.truncation, flexible.held_end(name)
+    truncation, inboard_end = motion.body.truncation, flexible.inboard_end(name)
     energies = strain_energy(motion)
     if truncation is None or not len(some) or not energies.max() > 0:
         return None
-    loads = flexible.end_loads(name) | {inboard_end: flexible.held_load(name)}
+    loads = flexible.end_loads(name) | {inboard_end: flexible.inboard_load(name)}
     zero = np.zeros((len(some), 3))
     inputs = []
     for port in truncation.ports:
         force, moment = (part[some] for part in loads[port]) if port in loads else (zero, zero)
         inputs += [motion.inward(force), motion.inward(moment)]
-    spin = tilde(motion.frame_spin)
-    frame_rotation_rate = tilde(motion.frame_spin_rate) + spin @ spin
+    spin = tilde(motion.frame_angular_velocity)
+    frame_rotation_rate = tilde(motion.frame_angular_acceleration) + spin @ spin
     inputs += [-np.swapaxes(frame_rotation_rate, 1, 2).reshape(-1, 9), motion.etadd]
     length = radius_of_gyration(motion.body)
-    missed = truncation.missed(np.concatenate(inputs, axis=1), length)
+    missed = truncation.missed_share(np.concatenate(inputs, axis=1), length)
     return float(missed[int(np.argmax(energies))])
 
 

@@ -38,8 +38,8 @@ class Motion:
         eta, etad, etadd: (n, modes) modal coordinates, speeds and accelerations.
         position: (n, 3) m, origin of the floating frame, inertial axes.
         rotation: (n, 3, 3), frame axes to inertial axes.
-        velocity, spin: (n, 3) m/s and rad/s, of the frame, inertial axes.
-        acceleration, spin_rate: (n, 3) m/s2 and rad/s2, of the frame, inertial axes.
+        velocity, angular_velocity: (n, 3) m/s and rad/s, of the frame, inertial axes.
+        acceleration, angular_acceleration: (n, 3) m/s2 and rad/s2, of the frame, inertial axes.
     """
 
     body: ModalBody
@@ -50,9 +50,9 @@ class Motion:
     position: Array
     rotation: Array
     velocity: Array
-    spin: Array
+    angular_velocity: Array
     acceleration: Array
-    spin_rate: Array
+    angular_acceleration: Array
 
     def some(self, samples: Any) -> Motion:
         """Motion at some of the samples: a slice or indices."""
@@ -81,9 +81,9 @@ class Motion:
         return self.inward(self.velocity)
 
     @cached_property
-    def frame_spin(self) -> Array:
+    def frame_angular_velocity(self) -> Array:
         """Angular velocity (n, 3) in rad/s of the frame, frame axes."""
-        return self.inward(self.spin)
+        return self.inward(self.angular_velocity)
 
     @cached_property
     def frame_acceleration(self) -> Array:
@@ -91,14 +91,14 @@ class Motion:
         return self.inward(self.acceleration)
 
     @cached_property
-    def frame_spin_rate(self) -> Array:
+    def frame_angular_acceleration(self) -> Array:
         """Angular acceleration (n, 3) in rad/s2 of the frame, frame axes."""
-        return self.inward(self.spin_rate)
+        return self.inward(self.angular_acceleration)
 
 
 _ARRAYS = (
-    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "spin", "acceleration",
-    "spin_rate",
+    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "angular_velocity", "acceleration",
+    "angular_acceleration",
 )  # fmt: skip
 
 
@@ -135,7 +135,7 @@ def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
 def values_at(shapes: BeamShapes, places: Array) -> ShapeValues:
     """Values of the shape functions at x (m,), cached unless there are too many."""
     if len(places) * shapes.n > _MAX_CACHED_VALUES:
-        return shapes.at(places)
+        return shapes.values_at(places)
     return _cached_values(shapes, np.ascontiguousarray(places, dtype=np.float64).tobytes())
 
 
@@ -145,7 +145,7 @@ _MAX_CACHED_VALUES = 2**17
 
 @lru_cache(maxsize=16)
 def _cached_values(shapes: BeamShapes, places: bytes) -> ShapeValues:
-    return shapes.at(np.frombuffer(places))
+    return shapes.values_at(np.frombuffer(places))
 
 
 def deflection(motion: Motion, places: Array) -> Array:
@@ -180,7 +180,7 @@ def second_order_motion(
     if not motion.shapes.stiffening:
         return np.zeros((len(motion.t), len(places), 6))
     field = motion.shapes.second_order
-    return field.of(places, getattr(motion, a), getattr(motion, b), carried)
+    return field.evaluate(places, getattr(motion, a), getattr(motion, b), carried)
 
 
 def slope(motion: Motion, places: Array) -> Array:
@@ -233,10 +233,10 @@ def elastic_moment(motion: Motion, places: Array) -> Array:
 def elastic_force(motion: Motion, places: Array) -> Array:
     """Axial force (n, m), EA s' in N, of the axial shapes; SceneError for a beam without them."""
     values = values_at(motion.shapes, places)
-    if not values.stretch.any():
+    if not values.axial_strain.any():
         raise SceneError(
             f'axial_force of "{motion.body.name}" from its shapes: it has no axial modes; '
             'use source = "equilibrium"'
         )
-    stretch = np.einsum("mk,tk->tm", values.stretch, motion.eta)
+    stretch = np.einsum("mk,tk->tm", values.axial_strain, motion.eta)
     return np.asarray(stretch * motion.shapes.sections(places).EA)

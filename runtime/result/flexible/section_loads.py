@@ -95,7 +95,7 @@ def section_loads(
             [p.some(samples) for p in lines],
         )
         sums = _PanelSums(motion.some(samples), edges, gravity, sampled_points, sampled_lines)
-        force[samples], moment[samples] = sums.at(places, held)
+        force[samples], moment[samples] = sums.section_loads(places, held)
     return force, moment
 
 
@@ -146,7 +146,7 @@ class _PanelSums:
         position = _deflected_positions(self.motion, np.array([load.x]))[:, 0]
         return np.concatenate([force, moment + np.cross(position, force)], axis=1)
 
-    def at(self, places: Array, held: float) -> tuple[Array, Array]:
+    def section_loads(self, places: Array, held: float) -> tuple[Array, Array]:
         """Force and moment at the sections, section axes."""
         zero = np.zeros((len(self.panels), 1, 6))
         inboard_sums = np.concatenate([zero, np.cumsum(self.panels, axis=1)], axis=1)
@@ -202,8 +202,8 @@ def _load_densities(motion: Motion, x: Array, gravity: Array) -> tuple[Array, Ar
         for modal, term in zip((motion.eta, motion.etad, motion.etadd), second, strict=True)
     )
     position[..., 0] += x
-    w = motion.frame_spin[:, None]
-    wd = motion.frame_spin_rate[:, None]
+    w = motion.frame_angular_velocity[:, None]
+    wd = motion.frame_angular_acceleration[:, None]
     frame_velocity = np.cross(w, position)
     acceleration = (
         motion.frame_acceleration[:, None] + np.cross(wd, position) + np.cross(w, frame_velocity)
@@ -237,11 +237,13 @@ def _rotary_inertia_moment(
         return np.zeros((len(motion.t), len(per_length), 3))
     if not motion.body.points:
         rows = motion.shapes.rows
-        theta = np.moveaxis(motion.shapes.carried(rows(x, 1), rows(x, 0)[3]), 2, 0)
+        theta = np.moveaxis(motion.shapes.inertia_rotation(rows(x, 1), rows(x, 0)[3]), 2, 0)
     rotation, rate, growth = _section_rotation(motion, theta, turned)
-    w = tilde(motion.frame_spin)[:, None]
+    w = tilde(motion.frame_angular_velocity)[:, None]
     acceleration = (
-        (tilde(motion.frame_spin_rate)[:, None] + w @ w) @ rotation + 2 * w @ rate + growth
+        (tilde(motion.frame_angular_acceleration)[:, None] + w @ w) @ rotation
+        + 2 * w @ rate
+        + growth
     )
     second = np.zeros((len(x), 3, 3))
     second[:, 1, 1], second[:, 2, 2] = per_length[:, 2], per_length[:, 1]

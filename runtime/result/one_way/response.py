@@ -109,7 +109,7 @@ def compute_responses(model: CompiledScene, run: Trajectory) -> OneWayResponses:
     if break_times[-1] == break_times[0]:
         return OneWayResponses(_start_responses(model, run), ResponseCost(0, 0, 0, total, 0.0))
     while True:
-        grid = Cells.between(break_times, cells)
+        grid = Cells.from_times(break_times, cells)
         load_run = _rerun_at_samples(model, run, grid)
         evaluations += load_run.statistics.evaluations
         observed = Observations(model, load_run)
@@ -199,8 +199,8 @@ def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -
         "motion": np.concatenate([spin, spin_rate, acceleration], axis=1),
     }  # fmt: skip
     loads = -evaluate(kernel("residual"), inputs, body.n)["e_f"]
-    inboard_end = rigid.held[body.name]
-    inboard_hinge = rigid.holders.get(body.name)
+    inboard_end = rigid.inboard_ends[body.name]
+    inboard_hinge = rigid.inboard_hinges.get(body.name)
     hinge_loads = [] if inboard_hinge is None else [(inboard_end, inboard_hinge.name, 1.0)]
     welds = [node for node in rigid.nodes.values() if split_node(node)[0] == body.name]
     hinge_loads += [(split_node(node)[1], node, -1.0) for node in welds]

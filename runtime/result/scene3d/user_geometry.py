@@ -34,10 +34,12 @@ def shape_solid(
 
     `kept`: contents of mesh files stored with the run, by path; others are read now.
     """
-    local_surface = _shape_surface(shape, kept).placed(shape.position, np.array(shape.rotation))
+    local_surface = _shape_surface(shape, kept).with_pose(shape.position, np.array(shape.rotation))
     owner = "ground" if shape.is_on_ground else f"bodies/{shape.owner}"
     colour = colour if shape.color is None else _parse_colour(shape.color)
-    return Solid(owner, shape.name, local_surface.placed(at, np.array(axes)), colour, shape.opacity)
+    return Solid(
+        owner, shape.name, local_surface.with_pose(at, np.array(axes)), colour, shape.opacity
+    )
 
 
 def _shape_surface(shape: Shape, kept: Mapping[str, bytes]) -> Surface:

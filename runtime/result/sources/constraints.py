@@ -39,7 +39,9 @@ def add_constraint(table: Table, observed: Observations, one: Constraint) -> Non
     table.vector(f"{name}.force", owner, _FORCE, force)
     if one.type == CURVE:
         packed = observed.engine.packed
-        column = int(packed.system.places["q"][packed.hinge_position[_frame_hinge_name(one)]])
+        column = int(
+            packed.system.first_indices["q"][packed.hinge_position[_frame_hinge_name(one)]]
+        )
         table.scalar(
             f"{name}.s", "", "parameter of the curve", lambda: observed.run.q[:, column],
             owner=owner,

@@ -40,9 +40,9 @@ def find_pulling_contacts(result: Record) -> Iterator[Risk]:
     """
     model = result.model
     rolling = [constraint for constraint in model.scene.constraint if constraint.type == ROLLING]
-    if not rolling or model.closed is None or not len(result.t):
+    if not rolling or model.loop_start is None or not len(result.t):
         return
-    shares = model.closed.loops.indeterminate_reactions
+    shares = model.loop_start.loops.indeterminate_reactions
     is_open = {
         constraint.name: _NORMAL_ROW in shares.get(constraint.name, ()) for constraint in rolling
     }

@@ -49,4 +49,4 @@ def add_load(table: Table, acting: AppliedLoads, load: Load, number: int) -> Non
 def inertial_components(acting: AppliedLoads, number: int, places: tuple[int, ...]) -> Array:
     """Inertial components (n, 3) of the three values of a load at `places`."""
     axes = acting.load(number)[1][:, 15:24].reshape(-1, 3, 3)
-    return np.einsum("nij,nj->ni", axes, acting.at(places))
+    return np.einsum("nij,nj->ni", axes, acting.values_at(places))

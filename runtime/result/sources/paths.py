@@ -97,7 +97,9 @@ def _with_parabola_rates(t: Array, values: Array) -> SampledVariable:
 
 def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> SampledVariable:
     """Input or signal along a run; a held input is constant in every step."""
-    slot = model.packed_scene.system.held.places[list(model.packed_scene.channels).index(name)]
+    slot = model.packed_scene.system.held_inputs.memory_indices[
+        list(model.packed_scene.channels).index(name)
+    ]
     if slot >= 0:
         return SampledVariable(states.memory[:, slot], np.zeros(len(states.t)))
     channel = model.packed_scene.channels[name]

@@ -108,8 +108,8 @@ def _reject_drives(model: CompiledScene, given: Mapping[str, Any]) -> None:
         names = [name for name in active.inputs if active.drive and name in given]
         if names:
             raise SceneError(
-                f'inputs["{names[0]}"]: the {active.what} follows this input, expected an input '
-                f'that prescribes no motion; use parameters={{"{names[0]}.value": ...}}'
+                f'inputs["{names[0]}"]: the {active.description} follows this input, expected an '
+                f'input that prescribes no motion; use parameters={{"{names[0]}.value": ...}}'
             )
 
 

@@ -60,11 +60,11 @@ class BatchModels:
     """Models of the runs, with their parameters and inputs."""
 
     models: tuple[CompiledScene, ...]
-    given: BatchInputs
+    inputs: BatchInputs
 
-    def of(self, k: int) -> CompiledScene:
+    def model_of_run(self, k: int) -> CompiledScene:
         """Model of run k."""
-        return self.given.model(self.models[k], k)
+        return self.inputs.model(self.models[k], k)
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def simulate_batch(
         np.full((n, len(times), model.packed_scene.system.n_memory), np.nan),
     )  # fmt: skip
     same_times = _has_same_times(model, models, settings)
-    closes = model.packed_scene.system.closes  # loops are closed with the parameters of `model`
+    closes = model.packed_scene.system.has_loops  # loops are closed with the parameters of `model`
     in_lanes = np.array([library is not None and same_times[id(m)] and m.fusion.lanes is library
                          and (m is model or not closes) for m in models], bool)  # fmt: skip
     in_lanes &= ~failed
@@ -226,7 +226,7 @@ def _lane_library(model: CompiledScene) -> FusedLibrary | None:
     packed = model.packed_scene
     if has_switches(packed.scene):
         return None
-    if packed.system.remembers or packed.scene.events or packed.system.driven:
+    if packed.system.uses_memory or packed.scene.events or packed.system.driven:
         return None
     return model.fusion.ready_lanes(math.inf)
 
@@ -237,7 +237,7 @@ def _run_in_lanes(
     arrays: _BatchArrays, threads: int,
 ) -> None:  # fmt: skip
     engine = given_inputs.with_times(model).looped
-    code = _sequential_code(model, settings) if model.packed_scene.system.closes else None
+    code = _sequential_code(model, settings) if model.packed_scene.system.has_loops else None
     systems = [SceneSystem(engine, code, with_power=False) for _ in range(threads)]
     start = np.ascontiguousarray(np.concatenate([q[rows], u[rows]], axis=1))
     start_times = np.full(len(start), settings.t_start)
@@ -337,7 +337,7 @@ def _run_trajectory(
     arrays.memory[i, columns] = result.memory
     arrays.success[i], arrays.messages[i] = result.success, result.message
     arrays.evaluations[i] = result.statistics.evaluations
-    arrays.methods[i] = () if choice is None else tuple(choice.stretches)
+    arrays.methods[i] = () if choice is None else tuple(choice.segments)
 
 
 def prepare_batch(

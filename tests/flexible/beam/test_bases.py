@@ -129,7 +129,7 @@ def test_a_beam_held_inside_has_shapes_on_either_side() -> None:
     body = body_of(HELD, at="b.mid", ends={"mid": 0.4}, modes={"y": 2}, length=1.0)
     assert body.modes == ("y1", "y2", "y3", "y4")
     root, mid, tip = (body.ports[name] for name in ("root", "mid", "tip"))
-    assert not mid.moves
+    assert not mid.can_move
     assert np.abs(root.phi[1]) == pytest.approx([2, 2, 0, 0], abs=1e-12)
     assert np.abs(tip.phi[1]) == pytest.approx([0, 0, 2, 2], abs=1e-12)
     expected = np.array([1.8751041, 4.6940911]) ** 4
@@ -247,7 +247,7 @@ def test_a_load_per_length_acts_on_the_mean_section() -> None:
     assert shapes is not None
     nodes, weights = np.polynomial.legendre.leggauss(30)
     x = 0.55 + 0.35 * nodes
-    values, second = shapes.at(x), shapes.second_order.at(x)
+    values, second = shapes.values_at(x), shapes.second_order.field_at(x)
     for found, exact in (
         (port.phi, values.phi), (port.theta, values.theta), (port.second_order, second)
     ):  # fmt: skip

@@ -43,7 +43,7 @@ def cantilever(parts: int, shapes: int, **beam: Any) -> mstmm.Model:
 
 def definite(body: ModalBody, slope: float) -> bool:
     assert body.shapes is not None
-    turns = body.shapes.at(np.linspace(0, body.shapes.length, 17)).theta
+    turns = body.shapes.values_at(np.linspace(0, body.shapes.length, 17)).theta
     return is_mass_definite(body, body.ports["root"], ANY, turns * (0.375 / slope))
 
 
@@ -136,7 +136,7 @@ def test_the_inertia_seen_is_that_of_the_engine() -> None:
     ]
     scene = mstmm.Scene(gravity=[0, 0, 0], body=[hub], beam=[blade], hinge=hinges)
     model = mstmm.compile(scene, engine="looped")
-    body, support = model.flexible_bodies["blade"], Supports(scene).of("blade")
+    body, support = model.flexible_bodies["blade"], Supports(scene).support_of("blade")
     for size in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2):
         eta = size * np.array([0.5, -1.0])
         matrix = model.mass_matrix([0.0, *eta])

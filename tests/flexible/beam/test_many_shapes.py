@@ -100,8 +100,8 @@ def test_what_motions_draw_is_what_all_pairs_draw(
     x = np.array([0.7, 0.0, 1.0, 0.31])
     a, b = rng.normal(size=(2, 6, shapes.n))
     for carried in (False, True):
-        pairs = np.einsum("mrkl,tk,tl->tmr", shapes.second_order.at(x, carried), a, b)
-        drawn = shapes.second_order.of(x, a, b, carried)
+        pairs = np.einsum("mrkl,tk,tl->tmr", shapes.second_order.field_at(x, carried), a, b)
+        drawn = shapes.second_order.evaluate(x, a, b, carried)
         np.testing.assert_allclose(drawn, pairs, atol=1e-13 * np.abs(pairs).max())
 
 
@@ -109,7 +109,7 @@ def test_sums_over_sections_are_the_sums_of_all_pairs(rng: np.random.Generator) 
     shapes = body(modes={"y": 3, "z": 3, "twist": 2}, frame="mean").shapes
     assert shapes is not None
     x, weights = rng.uniform(0.0, 1.0, 7), rng.normal(size=(2, 7))
-    whole = np.tensordot(weights, shapes.second_order.at(x), axes=1)
+    whole = np.tensordot(weights, shapes.second_order.field_at(x), axes=1)
     sums = shapes.second_order.sums(x, weights)
     np.testing.assert_allclose(sums, whole, atol=1e-13 * np.abs(whole).max())
 

@@ -39,12 +39,12 @@ def particles(body: ModalBody, count: int = 6) -> tuple[Array, Array, Array]:
     for start, end in zip(shapes.pieces, shapes.pieces[1:], strict=False):
         nodes, weights = np.polynomial.legendre.leggauss(count)
         x = start + (end - start) * (nodes + 1) / 2
-        values, section = shapes.at(x), shapes.sections(x)
+        values, section = shapes.values_at(x), shapes.sections(x)
         m = section.mass_per_length * weights * (end - start) / 2
         turn = values.theta.copy()
         if not shapes.rotary:
             # Sections keep the attitude of the frame in which the shapes were made.
-            slope = np.array([mode.turned for mode in shapes.modes])
+            slope = np.array([mode.frame_rotation for mode in shapes.modes])
             for k, mode in enumerate(shapes.modes):
                 turn[:, 1, k] = slope[k] if mode.direction == "z" else 0.0
                 turn[:, 2, k] = slope[k] if mode.direction == "y" else 0.0
@@ -88,7 +88,7 @@ def test_shortening_is_the_arc_length_of_the_bent_axis() -> None:
     assert shapes is not None
     eta = np.random.default_rng(7).normal(size=body.n)
     x = np.linspace(0.0, shapes.length, 1701)
-    phi = shapes.at(x).phi @ eta
+    phi = shapes.values_at(x).phi @ eta
     slope = np.gradient(phi[:, 1:], x, axis=0, edge_order=2)
     arc = np.concatenate([[0.0], np.cumsum((slope[1:] ** 2 + slope[:-1] ** 2).sum(1) / 2)])
     arc *= x[1] - x[0]
@@ -116,8 +116,8 @@ def test_what_vanishes_by_symmetry_is_exactly_zero() -> None:
     assert np.array_equal(body.K, np.diag(np.diag(body.K)))
     assert np.count_nonzero(body.F) == 7 + 6  # y and z shapes of equal form
     assert not body.G.any() and not body.X.any() and not body.ports["tip"].second_order.any()
-    assert not body.ports["root"].moves
-    assert body.ports["tip"].moves
+    assert not body.ports["root"].can_move
+    assert body.ports["tip"].can_move
     mean = body_of(FREE, modes={"y": 4})
     assert not mean.C.any()
     assert np.count_nonzero(mean.E) == 0

@@ -9,7 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from mstmm.runtime.flexible.beam.gauss_quadrature import gauss_between
+from mstmm.runtime.flexible.beam.gauss_quadrature import gauss_points
 from mstmm.runtime.flexible.beam.shape_functions import (
     Eigenfunction,
     Piecewise,
@@ -46,7 +46,7 @@ def exact(kind: str, number: int) -> tuple[Any, Any]:
 
 
 def integral(function: Any) -> float:
-    x, w = gauss_between((0.0, 1.0), lambda a, b: 80.0)
+    x, w = gauss_points((0.0, 1.0), lambda a, b: 80.0)
     return float(w @ function(x))
 
 
@@ -104,7 +104,7 @@ def test_closed_forms_of_free_and_supported_beams(k: int) -> None:
 
 @pytest.mark.parametrize("kind", BENDING)
 def test_shapes_are_orthonormal_far_beyond_the_textbook_form(kind: str) -> None:
-    x, w = gauss_between((0.0, 1.0), lambda a, b: 41.0)
+    x, w = gauss_points((0.0, 1.0), lambda a, b: 41.0)
     values = np.array([Eigenfunction(kind, k, 0.0, 1.0)(x) for k in range(1, 41)])
     assert np.abs((values * w) @ values.T - np.eye(40)).max() < 2e-13
 

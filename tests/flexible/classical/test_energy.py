@@ -102,12 +102,12 @@ def _planar_rows(
 def motion_of(letters: SymbolTable, shifts: int, modes: int) -> Motion:
     def three(name: str, size: int, before: int) -> sp.Matrix:
         behind = [0] * (3 - before - size)
-        return sp.Matrix([*[0] * before, *letters.of(vector(name, size)), *behind])
+        return sp.Matrix([*[0] * before, *letters.entries_of(vector(name, size)), *behind])
 
     turns = 1 if shifts == 2 else 3
     return Motion(
         three("a", shifts, 0), three("w", turns, 3 - turns), three("wd", turns, 3 - turns),
-        *(letters.of(vector(name, modes)) for name in (ETA, "etad", "etadd")),
+        *(letters.entries_of(vector(name, modes)) for name in (ETA, "etad", "etadd")),
     )  # fmt: skip
 
 
@@ -131,7 +131,7 @@ def numeric(
     for equation in definitions:
         value = equation.right.xreplace(values)
         put(str(equation.left.name), value.shape, list(value))
-    return sp.Matrix(letters.back(rows).xreplace(values)).applyfunc(sp.expand)
+    return sp.Matrix(letters.to_matrix_entries(rows).xreplace(values)).applyfunc(sp.expand)
 
 
 # --- space: particles -------------------------------------------------------------------------
@@ -197,7 +197,7 @@ def test_derivatives_of_the_rows_are_theirs() -> None:
     }
 
     def spelled(matrix: sp.Matrix) -> sp.Matrix:
-        return sp.Matrix(letters.back(matrix).xreplace(entries))
+        return sp.Matrix(letters.to_matrix_entries(matrix).xreplace(entries))
 
     rows = spelled(solved.rows)
     for name, columns_, matrix in (

@@ -47,7 +47,7 @@ def test_loads_of_an_end_in_balance_with_its_hinge(
     ports = {"root": held, "tip": wrench}
     loads = np.concatenate([*(ports[name] for name in body.truncation.ports),
                             np.zeros(9 + body.n)])  # fmt: skip
-    missed = body.truncation.missed(loads[None], radius_of_gyration(body))
+    missed = body.truncation.missed_share(loads[None], radius_of_gyration(body))
     assert missed[0] == pytest.approx(share, abs=1e-6)
 
 
@@ -58,7 +58,7 @@ def test_the_whole_deflection_is_that_of_a_bar(load: list[float]) -> None:
     signs = {"root": -1.0, "tip": 1.0}
     wrench = [signs[name] * np.array(load) for name in body.truncation.ports]
     given = np.concatenate([*wrench, np.zeros(9 + body.n)])
-    moved = dict(zip(body.truncation.ports, (body.truncation.whole @ given).reshape(-1, 6),
+    moved = dict(zip(body.truncation.ports, (body.truncation.full_response @ given).reshape(-1, 6),
                      strict=True))  # fmt: skip
     apart = (moved["tip"] - moved["root"]) @ load
     exact = LENGTH / (STRETCHING if load[0] else BENDING)

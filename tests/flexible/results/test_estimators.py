@@ -105,10 +105,10 @@ def test_modal_energies_share_the_energy() -> None:
     random = np.random.default_rng(3)
     motion = moving(body, eta=random.normal(size=body.n), etad=random.normal(size=body.n))
     x, weights = body.shapes.rule()
-    velocity = np.einsum("mak,k->ma", body.shapes.at(x).phi, motion.etad[0])
+    velocity = np.einsum("mak,k->ma", body.shapes.values_at(x).phi, motion.etad[0])
     kinetic = 0.5 * MASS * float(weights @ np.sum(velocity**2, axis=1))
     assert modal_energy(motion).sum() - strain_energy(motion)[0] == pytest.approx(kinetic)
-    bent = np.einsum("mak,k->ma", body.shapes.at(x).curvature[:, 1:], motion.eta[0])
+    bent = np.einsum("mak,k->ma", body.shapes.values_at(x).curvature[:, 1:], motion.eta[0])
     stored = 0.5 * float(weights @ (bent**2 @ [EI_Y, EI_Z]))
     assert strain_energy(motion)[0] == pytest.approx(stored)
 

@@ -93,7 +93,7 @@ def test_equivalent_motion_is_that_of_the_frame_while_nothing_is_bent() -> None:
     given = some_motion(body, 0.0)
     found = kernel_momentum(moving(body, **given))
     arm = np.asarray(given["rotation"]) @ [LENGTH / 2, 0.0, 0.0]
-    np.testing.assert_allclose(found.spin[0], given["spin"], rtol=1e-12)
+    np.testing.assert_allclose(found.angular_velocity[0], given["spin"], rtol=1e-12)
     expected = np.asarray(given["velocity"]) + np.cross(given["spin"], arm)
     np.testing.assert_allclose(found.velocity[0], expected, rtol=1e-12)
 

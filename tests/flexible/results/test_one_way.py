@@ -306,7 +306,7 @@ def test_oscillators_follow_any_load() -> None:
         part = solve_ivp(rate, (begin, end), state, "DOP853", times, rtol=1e-11, atol=1e-13)
         halves.append(part.y)
         state = part.y[:, -1]
-    cells = Cells.between(np.array([0.0, 1.0, 2.0]), 24)
+    cells = Cells.from_times(np.array([0.0, 1.0, 2.0]), 24)
     polynomials = cells.polynomials(loads(cells.samples))
     times = np.concatenate([np.linspace(0, 1.0 - 1e-13, 6), np.linspace(1, 2, 6)])
     found = Oscillators(stiffness, damping, mass).motion(
@@ -356,7 +356,7 @@ def test_a_run_that_cannot_be_repeated_is_named() -> None:
 @pytest.mark.parametrize("rate", [1.0, 300.0])
 def test_critically_damped(rate: float) -> None:
     """No eigenvectors to speak of: 1 - (1 + s) exp(-s) under a step."""
-    cells = Cells.between(np.array([0.0, 2.0]), 4)
+    cells = Cells.from_times(np.array([0.0, 2.0]), 4)
     times = np.linspace(0, 2, 9)
     still = (np.zeros(2), np.zeros(2))
     oscillators = Oscillators(rate**2 * np.eye(2), 2 * rate * np.eye(2), np.eye(2))

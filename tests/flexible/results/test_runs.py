@@ -179,7 +179,7 @@ def test_free_flight_keeps_the_equivalent_motion() -> None:
 
 def test_inner_nodes_are_no_bodies_and_no_hinges(run: Result) -> None:
     assert list(run.model.coordinate_layout.hinges) == ["base", "holder", "wrist"]
-    references = list(run._observed.references)
+    references = list(run._observations.references)
     assert references == [
         "hub", "hub.out", "bob", "blade", "blade.root", "blade.tip", "blade.mid"
     ]  # fmt: skip
@@ -199,7 +199,7 @@ def test_quantities_by_name(run: Result) -> None:
     for name in run.quantity_names():
         if "blade" in name or name.startswith("bob"):
             assert len(run.quantity(name).values) == len(run.t), name
-    assert np.isfinite(run._observed.part("efforts")).all()
+    assert np.isfinite(run._observations.part("efforts")).all()
 
 
 @pytest.mark.parametrize(

@@ -113,7 +113,7 @@ def test_a_twisted_beam_carries_the_torque_of_its_polar_inertia() -> None:
     etadd[twist[0]] = 5.0
     _, moment = section_loads(moving(body, etadd=etadd), X, STILL, 0.0)
     fine = np.linspace(0.0, LENGTH, 20001)
-    theta = body.shapes.at(fine).theta[:, 0, twist[0]] if body.shapes else fine
+    theta = body.shapes.values_at(fine).theta[:, 0, twist[0]] if body.shapes else fine
     exact = -0.03 * 5.0 * np.trapezoid(theta, fine)
     np.testing.assert_allclose(moment[0, 0, 0], exact, rtol=1e-7)
 

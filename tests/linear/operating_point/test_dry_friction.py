@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 import mstmm
 from mstmm.errors import SceneError
-from mstmm.runtime.linear.rotors.carrying import Carrying
+from mstmm.runtime.linear.rotors.frame_transform import FrameTransform
 
 #: m g l and the inertia of `pendulum` about its pivot.
 WEIGHT, INERTIA = 2 * 9.81 * 0.5, 0.53
@@ -156,7 +156,7 @@ def test_in_closed_loops_at_rest_and_in_motion() -> None:
             np.testing.assert_allclose(getattr(here, name), wanted, atol=1e-9, err_msg=name)
         assert any("dry friction is left out" in text for text in here.warnings)
     assert here.constrained_motion is not None
-    ways, places = here.constrained_motion.ways, here.constrained_motion.places
+    ways, places = here.constrained_motion.motion_basis, here.constrained_motion.independent_indices
     given = dry.linearize(q, u, friction=2.0)
     rests = np.ones(bare.nu)
     rests[0] = 0.0
@@ -266,7 +266,7 @@ def test_friction_by_an_expression_is_told_in_the_fixed_frame() -> None:
     for law, trusted in (("-0.5*sign(u)", False), ("-0.5*u", True)):
         linear = spun_disc(law).linearize()
         assert linear.trusted == linear.to_fixed_frame().trusted == trusted
-        fixed = replace(linear, carrying=Carrying(np.eye(2), np.zeros((2, 2))))
+        fixed = replace(linear, frame_transform=FrameTransform(np.eye(2), np.zeros((2, 2))))
         assert any(risk.name == "dry-friction" for risk in fixed.risks) != trusted
 
 

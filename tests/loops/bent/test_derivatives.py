@@ -35,15 +35,15 @@ def test_along_closed_motions(scene: Callable[[], Scene], rng: np.random.Generat
     model = compiled(scene())
     freedom, q, u = model.independent_speeds, *model.initial_state()
     assert freedom is not None
-    places = freedom.places
-    ways = freedom.following(q, places)
+    places = freedom.indices
+    ways = freedom.motion_matrix(q, places)
     own = u[list(places)] + rng.normal(scale=0.5, size=len(places))
     found = model.derivatives(q, ways @ own)
     assert worst(found.efforts, model.solve(q, np.eye(model.nu))) < 1e-11
 
     def state(x: Array, faster: Array) -> list[Array]:
         moved = model.assemble(q + ways @ x)[0] if x.any() else q
-        speeds = freedom.following(moved, places) @ (own + faster)
+        speeds = freedom.motion_matrix(moved, places) @ (own + faster)
         return [moved, speeds, model.accelerations(moved, speeds)]
 
     still = np.zeros(len(places))
@@ -78,7 +78,7 @@ def test_those_of_linear_models(scene: Callable[[], Scene]) -> None:
     model: mstmm.Model = compiled(made)
     linear = model.linearize()
     assert linear.constrained_motion is not None
-    along, places = linear.constrained_motion.ways, list(linear.free_speed_indices)
+    along, places = linear.constrained_motion.motion_basis, list(linear.free_speed_indices)
     found = model.derivatives(linear.state.q, linear.state.u)
     both = np.hstack([(found.q @ along)[places], (found.u @ along)[places]])
     assert worst(both, linear.A[len(places) :]) < 1e-11

@@ -180,7 +180,7 @@ def test_matrices_are_slopes_of_accelerations(make: Any) -> None:
     assert loops is not None
 
     def beside(x: Array) -> Array:
-        moved = q + model.looped.rates(0.0, q, loops.ways @ x, memory)
+        moved = q + model.looped.rates(0.0, q, loops.motion_basis @ x, memory)
         return model.accelerations(model.assemble(moved, still)[0], still)[places]
 
     slopes = [(beside(x) - beside(-x)) / (2 * STEP) for x in STEP * np.eye(n)]

@@ -80,8 +80,8 @@ def test_forces_that_close_the_loop_hold_the_shapes(name: str) -> None:
     q, u = model.initial_state()
     layout = model.coordinate_layout
     start = layout.hinges[scene["hinge"][0]["name"]].q_slice
-    assert model.closed is not None
-    np.testing.assert_allclose(q[start], model.closed.start[0][start], rtol=0, atol=1e-12)
+    assert model.loop_start is not None
+    np.testing.assert_allclose(q[start], model.loop_start.start[0][start], rtol=0, atol=1e-12)
     wrist = layout.hinges["wrist"]
     tree = opened(scene, rows, ends)
     q, u = np.delete(q, wrist.q_slice), np.delete(u, wrist.u_slice)
@@ -124,8 +124,8 @@ def test_given_shapes_and_held_hinges_stay() -> None:
     scene["hinge"][2] |= {"hold": True, "initial": {"q": [0.02, -0.03]}}
     model = compiled(still(scene, "right"))
     q, u = model.initial_state()
-    assert model.closed is not None
-    first, layout = model.closed.start[0], model.coordinate_layout
+    assert model.loop_start is not None
+    first, layout = model.loop_start.start[0], model.coordinate_layout
     for slots in (layout.modal["left"], layout.hinges["third"]):
         np.testing.assert_allclose(q[slots.q_slice], first[slots.q_slice], atol=1e-12)
     np.testing.assert_allclose(q[layout.hinges["third"].q_slice], [0.02, -0.03], atol=1e-12)
@@ -138,9 +138,9 @@ def test_given_shapes_and_held_hinges_stay() -> None:
 def test_a_mesh_starts_bent_too() -> None:
     model = compiled(still(meshed()))
     q, _ = model.initial_state()
-    assert model.closed is not None
+    assert model.loop_start is not None
     moved = model.coordinate_layout.modal["bar"].q_slice
-    assert abs(q[0] - model.closed.start[0][0]) < 1e-12 and np.abs(q[moved]).max() > 1e-5
+    assert abs(q[0] - model.loop_start.start[0][0]) < 1e-12 and np.abs(q[moved]).max() > 1e-5
 
 
 def test_what_is_too_soft_is_told() -> None:

@@ -134,7 +134,7 @@ def test_slopes_of_accelerations() -> None:
     linear, size = model.linearize(), 1e-4
     assert linear.constrained_motion is not None
     ways, places, q = (
-        linear.constrained_motion.ways,
+        linear.constrained_motion.motion_basis,
         list(linear.free_speed_indices),
         linear.state.q,
     )

@@ -23,20 +23,20 @@ SCENES = {"distances": governor("constraint"), "plane": on_a_plane(), "disc": on
 def test_along_closed_motions(name: str) -> None:
     """By central differences between states of the same independent speeds and others."""
     model, draw = compiled(SCENES[name]), np.random.default_rng(4)
-    freedom, closed = model.independent_speeds, model.closed
+    freedom, closed = model.independent_speeds, model.loop_start
     assert freedom is not None and closed is not None
-    q, places = model.initial_state()[0], freedom.places
+    q, places = model.initial_state()[0], freedom.indices
     x, v, dv = draw.normal(size=(3, len(places)))
     driven = np.zeros(model.nu)
     driven[sorted({*range(model.nu)} - {*model.free_speed_indices})] = 10.0
 
     def ahead(size: float) -> tuple[Array, Array]:
         moved = closed.assemble(q + size * rates, 0 * driven, (), ())[0]
-        u = driven + freedom.following(moved, places) @ (v + size * dv)
+        u = driven + freedom.motion_matrix(moved, places) @ (v + size * dv)
         u = closed.assemble(moved, u, (), ())[1]
         return u, model.accelerations(moved, u)
 
-    ways = freedom.following(q, places)
+    ways = freedom.motion_matrix(q, places)
     rates = model.looped.rates(0.0, q, ways @ x, model.looped.start_memory())
     forward, back, here = ahead(STEP), ahead(-STEP), ahead(0.0)
     found = model.derivatives(q, here[0])

@@ -80,7 +80,7 @@ def test_derivatives() -> None:
     found, draw = model.derivatives(q, u), np.random.default_rng(6)
     freedom = model.independent_speeds
     assert freedom is not None
-    ways = freedom.following(q, freedom.places)
+    ways = freedom.motion_matrix(q, freedom.indices)
     moved, faster = ways @ draw.normal(size=ways.shape[1]), draw.normal(size=model.nu)
     rates = model.looped.rates(0.0, q, moved, model.looped.start_memory())
 

@@ -123,7 +123,7 @@ def test_stiff_mechanisms(method: str, much: float, stiff: mstmm.Model) -> None:
     assert result.success, result.message
     assert np.abs(result.q[-1] - wanted.q[-1]).max() < much
     calls = LoopCalls(stiff.looped, result.q[-1])
-    for level in (calls.gap, calls.slip):
+    for level in (calls.position_level, calls.velocity_level):
         missing = calls.correction(level, result.q[-1], result.u[-1], t=0.3)[1]
         assert np.abs(missing).max() < 1e-10
 

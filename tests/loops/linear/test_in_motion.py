@@ -90,7 +90,7 @@ def test_slopes_along_closed_motions(scene: str) -> None:
     freedom = model.independent_speeds
     assert freedom is not None
     places = list(freedom.select(q))
-    u = u + freedom.following(q, places) @ (np.resize(speeds, len(places)) - u[places])
+    u = u + freedom.motion_matrix(q, places) @ (np.resize(speeds, len(places)) - u[places])
 
     def closed(q: Array) -> tuple[Array, Array]:
         """A state next to q and u in which they fit."""
@@ -105,9 +105,9 @@ def test_slopes_along_closed_motions(scene: str) -> None:
 
     def beside(x: Array, dv: Array) -> Array:
         """All speeds, and the accelerations of the independent ones."""
-        moved = q + model.looped.rates(0.0, q, loops.ways @ x, memory)
+        moved = q + model.looped.rates(0.0, q, loops.motion_basis @ x, memory)
         moved, fit = closed(moved)
-        fit = fit + freedom.following(moved, places) @ (u[places] + dv - fit[places])
+        fit = fit + freedom.motion_matrix(moved, places) @ (u[places] + dv - fit[places])
         return np.concatenate([fit, model.accelerations(moved, fit)[places]])
 
     still, found = np.zeros(n), []

@@ -176,5 +176,5 @@ def test_lost_digits_are_put_down_to_masses_only_where_these_are_unlike(
     scene = four_bar(knee={"axis": [math.sin(1e-3), 0, math.cos(1e-3)]})
     engine = mstmm.compile(mstmm.Scene(**scene), engine="looped").looped
     scene["body"][1] = rod("coupler", COUPLER, mass)
-    engine.packed.expanded.described = mstmm.Scene(**scene)
+    engine.packed.expanded.user_scene = mstmm.Scene(**scene)
     assert found in mass_ratio_text(engine)

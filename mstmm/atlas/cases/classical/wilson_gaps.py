@@ -18,7 +18,7 @@ def _largest_gap(step: float, scheme: str) -> float:
     run, largest = ClassicalSteps(double_pendulum(), parse_scheme(scheme), ITERATIONS), 0.0
     for _ in range(round(T_END / step)):
         run.advance(step)
-        upper, lower = run.moving()
+        upper, lower = run.part_movements()
         elbow = upper.position + upper.axes[:, :, 0]
         largest = max(largest, *np.abs([upper.position, lower.position - elbow]).max(axis=(1, 2)))
     return largest

@@ -32,7 +32,9 @@ def _projected_gap() -> float:
     times = STEP * np.arange(STEPS + 1)
     run = simulate_to_end(linkage, times[-1], "rk4", STEP, output_times=times)
     calls, still = LoopCalls(linkage.looped, run.q[0]), np.zeros(linkage.nu)
-    return max(float(np.abs(calls.correction(calls.gap, q, still)[1]).max()) for q in run.q)
+    return max(
+        float(np.abs(calls.correction(calls.position_level, q, still)[1]).max()) for q in run.q
+    )
 
 
 CASE = CaseDefinition(

@@ -25,7 +25,9 @@ def _error_with_speeds(step: float) -> float:
     run = simulate_to_end(linkage, times[-1], "rk4", step, output_times=times)
     calls = LoopCalls(linkage.looped, run.q[0])
     states = zip(run.q, run.u, strict=True)
-    return max(float(np.abs(calls.correction(calls.slip, *state)[1]).max()) for state in states)
+    return max(
+        float(np.abs(calls.correction(calls.velocity_level, *state)[1]).max()) for state in states
+    )
 
 
 CASE = CaseDefinition(

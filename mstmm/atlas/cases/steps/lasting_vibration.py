@@ -7,7 +7,7 @@ import numpy as np
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import STEP, relative_amplitudes
 from ...parameter_scale import LOG_SCALE
-from ...shared_scenes import RELEASE_ANGLE, sprung_rod, stiffness_for_frequency
+from ...shared_scenes import RELEASE_ANGLE, rod_with_spring, stiffness_for_frequency
 from ...variants import ros3p
 from ...variants.bare_rosenbrock import BareRosenbrock
 
@@ -17,8 +17,8 @@ RATE = 1e4
 
 def _remaining_ros3p(steps: float) -> float:
     count, rate = max(1, round(steps)), RATE / STEP
-    rod = sprung_rod(stiffness_for_frequency(rate))
-    q, u, _ = BareRosenbrock(rod, ros3p.tableau()).fixed(STEP, count)[-1]
+    rod = rod_with_spring(stiffness_for_frequency(rate))
+    q, u, _ = BareRosenbrock(rod, ros3p.tableau()).fixed_step_states(STEP, count)[-1]
     return float(np.hypot(q[0], u[0] / rate) / RELEASE_ANGLE)
 
 

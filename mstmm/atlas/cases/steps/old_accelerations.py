@@ -18,9 +18,9 @@ def _error(step: float, use_old: bool) -> float:
     step = T_END / steps
     exact = simulate_to_end(rods, T_END, rtol=1e-12, atol=1e-14, output_times=[T_END]).q[-1]
     if use_old:
-        angles = BareRosenbrock(rods, "rodas5p", accelerations=np.zeros(2)).fixed(step, steps)[
-            -1, 0
-        ]
+        angles = BareRosenbrock(rods, "rodas5p", accelerations=np.zeros(2)).fixed_step_states(
+            step, steps
+        )[-1, 0]
     else:
         angles = simulate_to_end(rods, T_END, "rodas5p", step, output_times=[T_END]).q[-1]
     return float(np.abs(angles - exact).max())

@@ -5,13 +5,13 @@ from __future__ import annotations
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import relative_growth
 from ...parameter_scale import LOG_SCALE
-from ...shared_scenes import sprung_rod
+from ...shared_scenes import rod_with_spring
 
 STEP, STEPS = 1e-3, 400
 
 
 def _growth(stiffness: float, method: str) -> float:
-    return relative_growth(sprung_rod(stiffness), STEP, STEPS, method)
+    return relative_growth(rod_with_spring(stiffness), STEP, STEPS, method)
 
 
 CASE = CaseDefinition(

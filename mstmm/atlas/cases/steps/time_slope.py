@@ -39,7 +39,9 @@ def _error(rate: float, time_slope: bool) -> float:
     if time_slope:
         displacement = simulate_to_end(car, TIMES[-1], "rodas4", STEP, output_times=TIMES).q[:, 0]
     else:
-        displacement = BareRosenbrock(car, "rodas4", time_slope=False).fixed(STEP, STEPS)[:, 0, 0]
+        displacement = BareRosenbrock(car, "rodas4", time_slope=False).fixed_step_states(
+            STEP, STEPS
+        )[:, 0, 0]
     return float(np.abs(displacement - exact).max() / WAVE_HEIGHT)
 
 

@@ -25,18 +25,18 @@ _AHEAD = 0.1
 def later(linear: LinearEquations) -> LinearEquations:
     """Linear equations at the later state of the motion."""
     state, loops = ahead(linear), linear.constrained_motion
-    loops = None if loops is None else loops.at(state)
-    turning = linear.rate_matrix if loops is None else loops.turning
-    carrying = linear.carrying
+    loops = None if loops is None else loops.at_state(state)
+    turning = linear.rate_matrix if loops is None else loops.rate_matrix
+    carrying = linear.frame_transform
     if carrying is not None:
-        carrying = carrying.later(state.t - linear.state.t)
+        carrying = carrying.advance(state.t - linear.state.t)
     return replace(
         linear,
         state=state,
         compiled_state=None,
         constrained_motion=loops,
         rate_matrix=turning,
-        carrying=carrying,
+        frame_transform=carrying,
     )
 
 
@@ -54,7 +54,7 @@ def ahead(linear: LinearEquations) -> State:
     return State(state.t + dt, q, u, a[0])
 
 
-def apart(one: Array, other: Array) -> float:
+def relative_difference(one: Array, other: Array) -> float:
     """Largest difference relative to the largest entry of the first array."""
     scale = float(np.abs(one).max(initial=0))
     return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 def applies_to(model: CompiledScene) -> bool:
     """Whether omitted redundant rows have a gap above rounding."""
-    return model.closed is not None and model.closed.loops.redundancy_gap[0] > 0.0
+    return model.loop_start is not None and model.loop_start.loops.redundancy_gap[0] > 0.0
 
 
-def loop_misfit_risks(
+def redundancy_gap_risks(
     model: CompiledScene, settings: Settings, q: Array, u: Array
 ) -> Iterator[Risk]:
     """Risk of the omitted row with the largest gap."""
-    assert model.closed is not None
-    gap, name, direction = model.closed.loops.redundancy_gap
+    assert model.loop_start is not None
+    gap, name, direction = model.loop_start.loops.redundancy_gap
     yield Risk(
         MISFIT_RISK, f'"{name}"',
         f"direction {direction} of the loop is redundant, violated by {gap:.1e} (m, rad); it is "

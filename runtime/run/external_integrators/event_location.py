@@ -29,15 +29,15 @@ _DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
-class Look:
+class ConditionValues:
     """Event functions and switch margins at a time (s), and the numbers that they read."""
 
     t: float
     values: Array
-    seen: Any
+    numbers: Any
 
 
-class Between:
+class StepConditions:
     """Conditions of `system` within one step from `start` to `end` (s).
 
     `dense` gives the states of the step, `watched` the values of conditions at a state.  `unseen`
@@ -49,32 +49,34 @@ class Between:
         dense: Callable[[float], Array], start: float, end: float,
         unseen: tuple[int, float] | None,
     ) -> None:  # fmt: skip
-        self._system, self._watched, self._dense = system, watched, dense
+        self._system, self._evaluate_conditions, self._dense = system, watched, dense
         self._start, self._end = start, end
-        self.unseen = unseen
+        self.missed_crossing = unseen
 
-    def look(self, t: float) -> Look:
+    def evaluate(self, t: float) -> ConditionValues:
         """Values of all conditions at a time (s) of the step."""
         y = self._dense(t)
         delta = max(_DIFFERENCE * (self._end - self._start), 8 * math.ulp(t))
         before, after = max(t - delta, self._start), min(t + delta, self._end)
         rates = (self._dense(after) - self._dense(before)) / ((after - before) or 1.0)
-        values = self._watched(t, y)  # before `see`, which reads what this computes
-        return Look(t, values, self._system.see(t, y, rates))
+        values = self._evaluate_conditions(t, y)  # before `read_numbers`, which reads its numbers
+        return ConditionValues(t, values, self._system.read_numbers(t, y, rates))
 
-    def first(self, i: int, sign: float, left: Look, right: Look) -> float | None:
+    def first_crossing(
+        self, i: int, sign: float, left: ConditionValues, right: ConditionValues
+    ) -> float | None:
         """Time (s) of the first crossing of condition i between left and right; None without one.
 
         A crossing is where `sign` times the value becomes positive, for an event also zero; it is
         not so at left.  The time is the first double after the crossing.
         """
         pending, count, min_width = [right], 0, math.inf
-        max_count = _MAX_BISECTIONS if self.unseen is None else _MAX_BISECTIONS_AFTER_MISS
+        max_count = _MAX_BISECTIONS if self.missed_crossing is None else _MAX_BISECTIONS_AFTER_MISS
         rounding = 4 * math.ulp(max(abs(left.t), abs(right.t)))
         min_interval = max(rounding, _MIN_INTERVAL * (right.t - left.t))
         while pending:
             end = pending[-1]
-            bounds = self._system.enclose(left.t, left.seen, end.t, end.seen)[i]
+            bounds = self._system.enclose(left.t, left.numbers, end.t, end.numbers)[i]
             undecided, upper = _may_cross(bounds, sign, left, end, i)
             min_width = min(min_width, bounds[1] - bounds[0])
             is_short, is_exhausted = (
@@ -83,13 +85,13 @@ class Between:
             )
             crosses = self._is_true(i, sign * float(end.values[i]))
             if undecided and not is_short and not is_exhausted:
-                pending.append(self.look(left.t + (end.t - left.t) / 2))
+                pending.append(self.evaluate(left.t + (end.t - left.t) / 2))
                 count += 1
                 continue
             excess = upper - max(sign * left.values[i], sign * end.values[i])
             missed = undecided and not crosses and excess > _MISS_TOLERANCE * min_width
             if is_exhausted or missed:
-                self.unseen = self.unseen or (i, left.t)
+                self.missed_crossing = self.missed_crossing or (i, left.t)
             if crosses:
                 return self._bisect(i, sign, left.t, end.t)
             left = pending.pop()
@@ -100,14 +102,18 @@ class Between:
 
     def _bisect(self, i: int, sign: float, left: float, right: float) -> float:
         while left < (middle := left + (right - left) / 2) < right:
-            if self._is_true(i, sign * float(self._watched(middle, self._dense(middle))[i])):
+            if self._is_true(
+                i, sign * float(self._evaluate_conditions(middle, self._dense(middle))[i])
+            ):
                 right = middle
             else:
                 left = middle
         return right
 
 
-def _may_cross(bounds: Array, sign: float, left: Look, right: Look, i: int) -> tuple[bool, float]:
+def _may_cross(
+    bounds: Array, sign: float, left: ConditionValues, right: ConditionValues, i: int
+) -> tuple[bool, float]:
     """True if there may be a crossing besides one at the right end; upper bound of the value.
 
     `bounds` (4,) are those of the value and of its slope (low, high, low, high).

@@ -13,32 +13,32 @@ from ..mck_matrices import Matrices
 
 
 @dataclass(frozen=True)
-class Carrying:
+class FrameTransform:
     """Transformation to the fixed frame at one time: y = T x, T' = W T, T W = W T.
 
-    `turned` is T (n, n), `rates` is W (n, n), 1/s.
+    `rotation` is T (n, n), `rates` is W (n, n), 1/s.
     """
 
-    turned: Array
+    rotation: Array
     rates: Array
 
-    def later(self, dt: float) -> Carrying:
+    def advance(self, dt: float) -> FrameTransform:
         """Transformation dt (s) later."""
-        return Carrying(self.turned @ expm(self.rates * dt), self.rates)
+        return FrameTransform(self.rotation @ expm(self.rates * dt), self.rates)
 
     def matrices(self, found: Matrices) -> Matrices:
         """Matrices M, C, K of y from those of x."""
-        back, w = np.linalg.inv(self.turned), self.rates
+        back, w = np.linalg.inv(self.rotation), self.rates
         m, c, k = (back.T @ one @ back for one in (found.M, found.C, found.K))
         return Matrices(m, c - 2 * m @ w, k - c @ w + m @ w @ w)
 
-    def pushed(self, columns: Array) -> Array:
+    def input_matrix(self, columns: Array) -> Array:
         """Input columns (n, inputs) of y from those of x."""
-        return np.asarray(np.linalg.solve(self.turned.T, columns))
+        return np.asarray(np.linalg.solve(self.rotation.T, columns))
 
     def rows(self, orders: dict[int, Array], places: list[int]) -> dict[int, Array]:
         """Output rows of y (outputs, nu), by power of s, from those of x at indices `places`."""
-        back, found = np.linalg.inv(self.turned), {k: wide.copy() for k, wide in orders.items()}
+        back, found = np.linalg.inv(self.rotation), {k: wide.copy() for k, wide in orders.items()}
         for order in sorted(orders, reverse=True):
             own = orders[order][:, places] @ back
             found[order][:, places] += own - orders[order][:, places]

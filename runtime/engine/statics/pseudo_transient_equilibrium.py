@@ -19,8 +19,8 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure
 
-from .rest import Unsettled
 from .shifted_stiffness import ShiftedStiffness, SolutionIsRounding
+from .static_equilibrium import EquilibriumNotFoundError
 
 #: Default maximum number of steps.
 MAX_STEPS = 2000
@@ -39,7 +39,7 @@ _PERTURBATION, _PERTURBATION_COUNT, _SAFETY_FACTOR = 4e-16, 3, 10.0
 _CANCELLATION_ROUNDING = 2e-16
 
 
-class RestBySweep:
+class PseudoTransientEquilibrium:
     """Search for a static equilibrium from one state.
 
     `settled` corrects the drives, quaternions and loops of a state or raises NumericalFailure;
@@ -55,25 +55,32 @@ class RestBySweep:
         most: int = MAX_STEPS,
         progress: Callable[[int, float], None] | None = None,
     ) -> None:
-        self.stiffness, self.settled, self.most, self.progress = stiffness, settled, most, progress
+        self.stiffness, self.consistent_state, self.max_steps, self.progress = (
+            stiffness,
+            settled,
+            most,
+            progress,
+        )
         self.cancelled = _CANCELLATION_ROUNDING * load  #: J, for tests with the smallest sigma
         self.steps = 0  #: number of steps of the last search
-        self._least = 0.0  # smallest sigma with solutions above rounding
+        self._min_sigma = 0.0  # smallest sigma with solutions above rounding
 
     def find(self, q: Array, tolerance: float) -> Array:
         """Find q (nq,) at rest, to `tolerance` times the characteristic scales, or to rounding.
 
-        Raises Unsettled with the unbalanced efforts (nu,) after `most` steps.
+        Raises EquilibriumNotFoundError with the unbalanced efforts (nu,) after `most` steps.
         """
-        self.steps, q = 0, self.settled(q)
+        self.steps, q = 0, self.consistent_state(q)
         missing_efforts, is_near = self.stiffness.residual(q), False
         if self._is_rounding(q, missing_efforts):
             return q
         sigma = first_sigma = self._unrest(q) / _FIRST_STEP
-        self._least = _MIN_SIGMA_RATIO * sigma
-        for k in range(self.most):
+        self._min_sigma = _MIN_SIGMA_RATIO * sigma
+        for k in range(self.max_steps):
             if sigma > _MAX_SIGMA_RATIO * first_sigma:
-                raise Unsettled(f"after {k} steps no further step leads on", missing_efforts)
+                raise EquilibriumNotFoundError(
+                    f"after {k} steps no further step leads on", missing_efforts
+                )
             step = self._step(missing_efforts, sigma, tolerance)
             step_length = np.inf if step is None else self.stiffness.length(step)
             if self.progress is not None:
@@ -82,7 +89,7 @@ class RestBySweep:
                 return q  # sigma is negligible
             if step_length < _ROUNDING_STEP and self._is_rounding(q, missing_efforts):
                 return q
-            if sigma <= self._least and self._is_rounding(q, missing_efforts, self.cancelled):
+            if sigma <= self._min_sigma and self._is_rounding(q, missing_efforts, self.cancelled):
                 return q  # directions without stiffness move by rounding only
             next_state = None if step is None else self._ahead(q, step, missing_efforts)
             if next_state is None:
@@ -91,10 +98,12 @@ class RestBySweep:
                 continue
             self.steps, (q, missing_efforts) = self.steps + 1, next_state
             is_near = step_length <= tolerance and sigma <= first_sigma
-            if is_near and sigma <= self._least:
+            if is_near and sigma <= self._min_sigma:
                 return q
-            sigma = max(sigma / (_SIGMA_FAST_DECREASE if is_near else _SIGMA_DECREASE), self._least)
-        raise Unsettled(f"not at rest after {self.most} steps", missing_efforts)
+            sigma = max(
+                sigma / (_SIGMA_FAST_DECREASE if is_near else _SIGMA_DECREASE), self._min_sigma
+            )
+        raise EquilibriumNotFoundError(f"not at rest after {self.max_steps} steps", missing_efforts)
 
     def _step(self, missing: Array, sigma: float, tolerance: float) -> Array | None:
         """Step from the state of the last residual, limited to `_MAX_STEP`.
@@ -106,7 +115,7 @@ class RestBySweep:
             stiffness.factor(sigma)
             step = -stiffness.solve(missing)
         except SolutionIsRounding:
-            self._least = _SIGMA_INCREASE * sigma
+            self._min_sigma = _SIGMA_INCREASE * sigma
             return None
         except NumericalFailure:
             return None
@@ -122,7 +131,7 @@ class RestBySweep:
         tangent must be that of q: it converts a motion to a change of coordinates.
         """
         try:
-            next_q = self.settled(q + self.stiffness.tangent.coordinates(step))
+            next_q = self.consistent_state(q + self.stiffness.tangent.coordinates(step))
             next_efforts = self.stiffness.residual(next_q)
         except NumericalFailure:
             return None
@@ -146,7 +155,7 @@ class RestBySweep:
 
     def _unrest(self, q: Array) -> float:
         """Largest acceleration in characteristic scales."""
-        tangent, zero_speeds = self.stiffness.tangent, self.stiffness.still
+        tangent, zero_speeds = self.stiffness.tangent, self.stiffness.zero_speeds
         state = np.array([self.stiffness.t]), q[None], zero_speeds[None], tangent.memory[None]
         max_acceleration = self.stiffness.length(tangent.engine.accelerations(*state)[1][0])
         if not np.isfinite(max_acceleration):

@@ -39,7 +39,7 @@ _ROUNDING = 1e-9
 
 def has_speed_rows(model: CompiledScene) -> bool:
     """Whether the scene has nonholonomic rows: rolling discs, couplings of speeds."""
-    scene = model.packed_scene.described
+    scene = model.packed_scene.user_scene
     return any(one.type == ROLLING for one in scene.constraint) or any(
         one.speeds is not None for one in scene.coupling
     )
@@ -50,36 +50,39 @@ class RollingMechanism(ConstrainedLinearisation):
     """Independent positions and speeds; `places` and `ways` P (nu, n) belong to the positions.
 
     Attributes:
-        speed_places: indices of the m independent speeds v.
-        speed_ways: (nu, m) N, all speeds for a unit of each v.
+        speed_indices: indices of the m independent speeds v.
+        speed_basis: (nu, m) N, all speeds for a unit of each v.
         swept: (nu, n) S, change of all speeds for a unit of each position at the same v.
     """
 
-    speed_places: tuple[int, ...] = ()
-    speed_ways: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    speed_indices: tuple[int, ...] = ()
+    speed_basis: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     swept: Array = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
 
     @property
     def basis(self) -> Array:
         """Basis (2 nu, n + m): (phi, du) for a unit of each of (x, v)."""
-        nothing = np.zeros_like(self.speed_ways)
-        return np.block([[self.ways, nothing], [self.swept, self.speed_ways]])
+        nothing = np.zeros_like(self.speed_basis)
+        return np.block([[self.motion_basis, nothing], [self.swept, self.speed_basis]])
 
     @property
-    def own(self) -> list[int]:
+    def state_indices(self) -> list[int]:
         """Indices of (x, v) in (phi, du)."""
-        return [*self.places, *(len(self.ways) + k for k in self.speed_places)]
+        return [
+            *self.independent_indices,
+            *(len(self.motion_basis) + k for k in self.speed_indices),
+        ]
 
-    def kept_speeds(self, q: Array, u: Array, rotation: Array) -> Array:
+    def admissible_speeds(self, q: Array, u: Array, rotation: Array) -> Array:
         """Admissible speeds (nu,) at q (nq,) with the independent speeds of u (nu,) in the frames.
 
         `rotation` (nu, nu) maps from the axes of the bodies at q to the frames.
         """
-        freedom, places = self.model.independent_speeds, list(self.speed_places)
+        freedom, places = self.model.independent_speeds, list(self.speed_indices)
         assert freedom is not None
         wished = rotation.T @ u
-        found = freedom.without_slip(q, wished)
-        ways = rotation @ freedom.following(q, places)
+        found = freedom.remove_velocity_errors(q, wished)
+        ways = rotation @ freedom.motion_matrix(q, places)
         missed = (rotation @ (wished - found))[places]
         return np.asarray(found + rotation.T @ (ways @ np.linalg.solve(ways[places], missed)))
 
@@ -88,23 +91,23 @@ class RollingMechanism(ConstrainedLinearisation):
         return dict(orders)
 
     def matrices(self, *_: object) -> NoReturn:
-        refuse_second_order(self)
+        reject_second_order(self)
 
-    def pushed(self, *_: object) -> NoReturn:
-        refuse_second_order(self)
+    def input_matrix(self, *_: object) -> NoReturn:
+        reject_second_order(self)
 
-    def driven(self, *_: object) -> NoReturn:
+    def drive_columns(self, *_: object) -> NoReturn:
         raise SceneError(
             "linear model: motions of drives are no inputs beside a motion with rows of speeds; "
             "name efforts or forces"
         )
 
 
-def refuse_second_order(found: RollingMechanism) -> NoReturn:
+def reject_second_order(found: RollingMechanism) -> NoReturn:
     """Raise SceneError for M, C, K and quantities derived from them."""
     raise SceneError(
-        f"linear model: rows of speeds leave {len(found.places)} positions and "
-        f"{len(found.speed_places)} speeds here, which have no M, C, K, V and W; take A, B and "
+        f"linear model: rows of speeds leave {len(found.independent_indices)} positions and "
+        f"{len(found.speed_indices)} speeds here, which have no M, C, K, V and W; take A, B and "
         "states"
     )
 
@@ -127,13 +130,13 @@ def rolling_at(
     freedom = model.independent_speeds
     assert freedom is not None
     rows = _Rows(freedom, state.q)
-    basis = rows.allowed(rows.of_positions)
+    basis = rows.null_space_basis(rows.position_rows)
     if own is None:
         free = list(model.free_speed_indices)
         size = np.abs(state.u).max(initial=0.0) ** 2
         leaves = np.zeros(model.nu) if changing is None else np.abs(changing) > _ROUNDING * size
         lasting = sorted(free, key=lambda k: bool(leaves[k]))
-        motions = np.linalg.qr(freedom.following(state.q, freedom.select(state.q))
+        motions = np.linalg.qr(freedom.motion_matrix(state.q, freedom.select(state.q))
                                / freedom.sizes[:, None])[0]  # fmt: skip
         own = (
             tuple(sorted(select_rows(basis, free)[0])),
@@ -142,15 +145,24 @@ def rolling_at(
     positions, speeds = own
     ways = basis * freedom.sizes[:, None]
     ways = ways @ np.linalg.inv(ways[list(positions)])
-    speed_ways = freedom.following(state.q, speeds)
+    speed_ways = freedom.motion_matrix(state.q, speeds)
     swept = rows.swept(ways, state.u)
     swept -= speed_ways @ swept[list(speeds)]
     nothing = np.zeros((len(positions), len(positions)))
     rough, tree = torn_trees(model, dry)
     return RollingMechanism(
-        model, tree, model.free_speed_indices, positions, ways, nothing, rough=rough, dry=dry,
-        speed_places=speeds, speed_ways=speed_ways, swept=swept,
-    )  # fmt: skip
+        model,
+        tree,
+        model.free_speed_indices,
+        positions,
+        ways,
+        nothing,
+        tree_with_friction=rough,
+        dry=dry,
+        speed_indices=speeds,
+        speed_basis=speed_ways,
+        swept=swept,
+    )
 
 
 class _Rows:
@@ -158,13 +170,13 @@ class _Rows:
 
     def __init__(self, freedom: IndependentSpeeds, q: Array) -> None:
         self._freedom, self._q, self._sizes = freedom, q, freedom.sizes
-        self._J = np.array([freedom.slip(q, one) for one in np.eye(len(self._sizes))]).T
-        of_speeds = freedom.rows_of_speeds
-        self.of_positions = [k for k in range(len(self._J)) if k not in of_speeds]
+        self._J = np.array([freedom.velocity_errors(q, one) for one in np.eye(len(self._sizes))]).T
+        of_speeds = freedom.speed_rows
+        self.position_rows = [k for k in range(len(self._J)) if k not in of_speeds]
 
-    def allowed(self, rows: Sequence[int]) -> Array:
+    def null_space_basis(self, rows: Sequence[int]) -> Array:
         """Basis (nu, n) of the null space of some rows, orthonormal in characteristic scales."""
-        free = self._freedom.free
+        free = self._freedom.free_indices
         scaled = (self._J * self._sizes)[np.ix_(rows, free)]
         _, lengths, across = np.linalg.svd(scaled)
         rank = int((lengths > _ROUNDING * lengths.max(initial=0.0)).sum())
@@ -174,14 +186,16 @@ class _Rows:
 
     def swept(self, ways: Array, u: Array) -> Array:
         """Changes of speed (nu, n) that keep J u zero along perturbations `ways` (nu, n)."""
-        free = self._freedom.free
-        changes = np.reshape([self._change(way, u) for way in ways.T], (-1, len(self._J))).T
+        free = self._freedom.free_indices
+        changes = np.reshape(
+            [self._directional_derivative(way, u) for way in ways.T], (-1, len(self._J))
+        ).T
         scaled = (self._J * self._sizes)[:, free]
         found = np.zeros_like(ways)
         found[free] = -np.linalg.lstsq(scaled, changes, rcond=_ROUNDING)[0]
         return np.asarray(found * self._sizes[:, None])
 
-    def _change(self, way: Array, u: Array) -> Array:
+    def _directional_derivative(self, way: Array, u: Array) -> Array:
         """Derivative (rows,) of J u along a perturbation (nu,), with the most consistent step."""
         size = float(np.abs(way / self._sizes).max())
         tried = [self._difference(way, u, step / size) for step in _STEPS]
@@ -193,5 +207,5 @@ class _Rows:
         for count, weight in _WEIGHTS.items():
             for sign in (1.0, -1.0):
                 q = self._freedom.move(self._q, sign * count * step * way)
-                found += sign * weight / step * self._freedom.slip(q, u)
+                found += sign * weight / step * self._freedom.velocity_errors(q, u)
         return found

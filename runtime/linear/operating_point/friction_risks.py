@@ -14,7 +14,7 @@ from mstmm.array_validation import Array
 from mstmm.risk import Risk
 
 from ...engine.characteristic_scales import speed_scales
-from .friction import Rubbing
+from .friction import StickingFriction
 
 if TYPE_CHECKING:
     from ..linear_equations import LinearEquations
@@ -41,10 +41,10 @@ _LISTED, _SOFT = 4, 1e-12
 
 def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
     """Risk for all hinges whose friction is omitted: the amplitude below which they stick."""
-    left = [one for one in linear.dry.rubbing.values() if not one.given] if linear.dry else []
+    left = [one for one in linear.dry.sticking.values() if not one.is_given] if linear.dry else []
     if not left:
         return
-    amplitudes = _stuck_below(linear, left)
+    amplitudes = _sticking_amplitudes(linear, left)
     sizes = speed_scales(linear.model)[[one.speed for one in left]]
     order = np.argsort(-amplitudes / sizes, kind="stable")
     layout, worst = linear.model.coordinate_layout, int(order[0])
@@ -66,7 +66,7 @@ def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
 
 
 @dataclass(frozen=True)
-class Ways:
+class IndependentMotions:
     """Independent motions about a state.
 
     Attributes:
@@ -79,24 +79,27 @@ class Ways:
     names: Sequence[str]
     units: Sequence[str]
     sizes: Array
-    along: Callable[[Array], Array]
-    onto: Callable[[Array], Array]
+    to_speeds: Callable[[Array], Array]
+    to_motion_efforts: Callable[[Array], Array]
 
 
-def ways_of(linear: LinearEquations) -> Ways:
+def independent_motions(linear: LinearEquations) -> IndependentMotions:
     """Independent motions of x; for a rotor in axes that rotate with it."""
     plain, free, loops = (
-        replace(linear, carrying=None),
+        replace(linear, frame_transform=None),
         list(linear.free_speed_indices),
         linear.constrained_motion,
     )
-    return Ways(
-        linear.coordinate_names, linear.coordinate_units, speed_scales(linear.model)[free],
-        plain.expand, lambda efforts: efforts[free] if loops is None else loops.ways.T @ efforts,
-    )  # fmt: skip
+    return IndependentMotions(
+        linear.coordinate_names,
+        linear.coordinate_units,
+        speed_scales(linear.model)[free],
+        plain.expand,
+        lambda efforts: efforts[free] if loops is None else loops.motion_basis.T @ efforts,
+    )
 
 
-def saturation_risks(linear: LinearEquations, ways: Ways) -> Iterator[Risk]:
+def saturation_risks(linear: LinearEquations, ways: IndependentMotions) -> Iterator[Risk]:
     """Risks of coordinates with friction by an expression.
 
     These have an effort that jumps with speed at the state, such as -10*sign(u), or damping that
@@ -125,7 +128,9 @@ def saturation_risks(linear: LinearEquations, ways: Ways) -> Iterator[Risk]:
             yield _saturated_risk(name, ways, k, float(parts[k]))
 
 
-def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float], Array]:
+def _work(
+    linear: LinearEquations, ways: IndependentMotions, signs: Array
+) -> Callable[[float], Array]:
     """Function of a speed that returns differences (k, n) of efforts along the coordinates.
 
     The differences are between this speed, in characteristic scales per second with `signs` (k, n),
@@ -137,15 +142,18 @@ def _work(linear: LinearEquations, ways: Ways, signs: Array) -> Callable[[float]
     def efforts(u: Array, a: Array) -> Array:
         return tree.inverse_dynamics(state.t, state.q, u, a, memory)
 
-    def one(speed: float, row: Array) -> Array:
-        step = ways.along(row * ways.sizes)
+    def effort_difference(speed: float, row: Array) -> Array:
+        step = ways.to_speeds(row * ways.sizes)
         if speed:
             step = speed * step
             return efforts(state.u + step, state.udot) - efforts(state.u - step, state.udot)
         return efforts(state.u, state.udot + step) - efforts(state.u, state.udot)
 
     def work(speed: float) -> Array:
-        found = np.array([ways.onto(one(speed, row)) for row in signs]) * signs
+        found = (
+            np.array([ways.to_motion_efforts(effort_difference(speed, row)) for row in signs])
+            * signs
+        )
         return found if len(ways.sizes) > _SINGLE else found.diagonal()[None]
 
     return work
@@ -162,7 +170,7 @@ def _jump_risk(name: str, unit: str, jump: float, least: float) -> Risk:
     )  # fmt: skip
 
 
-def _saturated_risk(name: str, ways: Ways, k: int, part: float) -> Risk:
+def _saturated_risk(name: str, ways: IndependentMotions, k: int, part: float) -> Risk:
     """Risk of damping that saturates above low speeds."""
     return Risk(
         "dry-friction", name,
@@ -187,7 +195,7 @@ def _unit(linear: LinearEquations, speed: int) -> str:
     return slots.u_units[speed - slots.u].removesuffix("/s")
 
 
-def _stuck_below(linear: LinearEquations, left: list[Rubbing]) -> Array:
+def _sticking_amplitudes(linear: LinearEquations, left: list[StickingFriction]) -> Array:
     """Amplitude (k,) below which static friction holds each speed against the stiffness.
 
     All other coordinates follow.  It is infinite without stiffness.
@@ -196,7 +204,7 @@ def _stuck_below(linear: LinearEquations, left: list[Rubbing]) -> Array:
     if not linear.has_stiffness:
         return np.full(len(left), np.inf)
     if linear.constrained_motion is not None:
-        ways = linear.constrained_motion.ways[[one.speed for one in left]]
+        ways = linear.constrained_motion.motion_basis[[one.speed for one in left]]
     else:
         places = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
         for row, one in zip(ways, left, strict=True):

@@ -36,7 +36,7 @@ _LATEST = float(_TIMES[-1])
 _SPARSE = 3
 #: Motion (rad or characteristic scales) between projections of closed loops, and the largest number
 #: of projections.
-_STRIDE, _MOST_STRIDES = 0.1, 100
+_STRIDE, _MAX_STRIDES = 0.1, 100
 
 
 class LaterStates:
@@ -52,23 +52,27 @@ class LaterStates:
 
     def __init__(self, linear: LinearEquations) -> None:
         self._linear, system = linear, linear.model.packed_scene.system
-        state, first = linear.state, system.places["u"]
+        state, first = linear.state, system.first_indices["u"]
         drives = [int(first[place]) + k for place, k in system.driven]
         self.driven = [k for k in drives if state.u[k] or state.udot[k]]
-        turning = [*self._at(self._phases())]
-        timed = [] if system.is_autonomous else [*self._at([*_TIMES, *self._breaks()])]
+        turning = [*self._states_at(self._phases())]
+        timed = (
+            []
+            if system.is_autonomous
+            else [*self._states_at([*_TIMES, *self._times_between_breaks()])]
+        )
         uniform = not self.driven or all(
             np.allclose(one.u[drives], state.u[drives], rtol=1e-12)
             and not one.udot[drives].any() for one in timed
         )  # fmt: skip
         fixed = not self.driven and all(not one.u[drives].any() for one in timed)
-        depends = system.has_timed_loads or system.closes or not (uniform or fixed)
-        self.every = [*turning, *timed]
-        self.sparse = [*turning, *(timed[::_SPARSE] if depends else ())]
+        depends = system.has_timed_loads or system.has_loops or not (uniform or fixed)
+        self.all_states = [*turning, *timed]
+        self.compared_states = [*turning, *(timed[::_SPARSE] if depends else ())]
 
     def equations(self) -> Iterator[LinearEquations]:
-        """Yield the linear equations at the states `sparse`."""
-        for state in self.sparse:
+        """Yield the linear equations at the states `compared_states`."""
+        for state in self.compared_states:
             yield equations_at(self._linear, state)
 
     @property
@@ -91,7 +95,7 @@ class LaterStates:
         times = [phase / rate for rate in sorted(ends, reverse=True) for phase in _PHASES]
         return list(dict.fromkeys(min(time, _LATEST) for time in times))
 
-    def _breaks(self) -> list[float]:
+    def _times_between_breaks(self) -> list[float]:
         """Times (s) after the state, midway between breaks of expressions and inputs."""
         scene, t = self._linear.model.scene, self._linear.state.t
         inputs, found = scene.channels, set[float]()
@@ -103,7 +107,7 @@ class LaterStates:
         ends = [0.0, *ahead, *([2 * ahead[-1]] if ahead else [])]
         return [(a + b) / 2 for a, b in pairwise(ends)]
 
-    def _at(self, times: list[float]) -> Iterator[State]:
+    def _states_at(self, times: list[float]) -> Iterator[State]:
         """Yield the states at `times` (s) after the operating point that can be evaluated."""
         for dt in times:
             try:
@@ -117,17 +121,20 @@ class LaterStates:
 def equations_at(linear: LinearEquations, state: State) -> LinearEquations:
     """Linear equations at another state of the same motion."""
     loops = linear.constrained_motion
-    loops = None if loops is None else loops.at(state)
-    turning, carrying = linear.rate_matrix if loops is None else loops.turning, linear.carrying
+    loops = None if loops is None else loops.at_state(state)
+    turning, carrying = (
+        linear.rate_matrix if loops is None else loops.rate_matrix,
+        linear.frame_transform,
+    )
     if carrying is not None:
-        carrying = carrying.later(state.t - linear.state.t)
+        carrying = carrying.advance(state.t - linear.state.t)
     return replace(
         linear,
         state=state,
         compiled_state=None,
         constrained_motion=loops,
         rate_matrix=turning,
-        carrying=carrying,
+        frame_transform=carrying,
     )
 
 
@@ -137,18 +144,20 @@ def _state_after(linear: LinearEquations, dt: float) -> State | None:
     if linear.constrained_motion is not None:
         rate = float((np.abs(state.u) / speed_scales(linear.model)).max(initial=0))
         count = max(1, int(np.ceil(dt * rate / _STRIDE)))
-        if count > _MOST_STRIDES:
+        if count > _MAX_STRIDES:
             return None
     q, u = state.q, state.u
     for k in range(count):
-        q, u = _moved(linear, state.t + dt * (k + 1) / count, q, u, dt / count)
+        q, u = _move_state(linear, state.t + dt * (k + 1) / count, q, u, dt / count)
     engine = linear.model.looped
     memory = engine.start_memory()[None]
     _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory)
     return State(state.t + dt, q, u, a[0])
 
 
-def _moved(linear: LinearEquations, t: float, q: Array, u: Array, dt: float) -> tuple[Array, Array]:
+def _move_state(
+    linear: LinearEquations, t: float, q: Array, u: Array, dt: float
+) -> tuple[Array, Array]:
     """State at t after a step dt that satisfies drives and loops and keeps the speeds of x."""
     model, loops = linear.model, linear.constrained_motion
     engine = model.looped
@@ -157,7 +166,7 @@ def _moved(linear: LinearEquations, t: float, q: Array, u: Array, dt: float) -> 
     whole = SceneSystem(engine).start(t, q, u)
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
     if loops is not None and model.independent_speeds is not None:
-        places = list(loops.places)
-        ways = model.independent_speeds.following(q, places)
+        places = list(loops.independent_indices)
+        ways = model.independent_speeds.motion_matrix(q, places)
         u = u + ways @ (linear.state.u[places] - u[places])
     return q, u

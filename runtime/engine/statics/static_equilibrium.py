@@ -21,7 +21,7 @@ _MAX_STEP = 0.5  # in characteristic scales of the coordinates
 #: of fourth order, which are used after steps shorter than the third number, in characteristic
 #: scales.
 _SLACK_STIFFNESS, _SLACK_EXACT_STIFFNESS, _EXACT_STEP = 1e-8, 1e-10, 0.1
-_MAX_ITERATIONS, _MAX_ITERATIONS_OF_A_PART = 200, 20
+_MAX_ITERATIONS, _MAX_PART_ITERATIONS = 200, 20
 #: Forces without potential have no descent direction: relative asymmetry of their stiffness, and
 #: number of iterations after which Newton's method then counts as not convergent.
 _MAX_ASYMMETRY, _ITERATIONS_WITHOUT_POTENTIAL = 1e-4, 20
@@ -39,27 +39,29 @@ _RELATIVE_ROUNDING = 1e-16
 _INITIAL_LOAD_STEP, _MIN_LOAD_STEP = 0.25, 2.0**-10
 
 
-class Unsettled(NumericalFailure):
+class EquilibriumNotFoundError(NumericalFailure):
     """Equilibrium not found; `residual` (n,) are the remaining efforts in the coordinates."""
 
-    def __init__(self, message: str, residual: Array, problem: Rest | None = None) -> None:
+    def __init__(
+        self, message: str, residual: Array, problem: EquilibriumProblem | None = None
+    ) -> None:
         super().__init__(message)
         self.residual, self.problem = residual, problem
 
 
-class Undetermined(NumericalFailure):
+class UndeterminedEquilibriumError(NumericalFailure):
     """Equilibrium without stiffness in some directions.
 
     `places` are the coordinates of `problem` that these directions move.
     """
 
-    def __init__(self, places: Sequence[int], problem: Rest) -> None:
+    def __init__(self, places: Sequence[int], problem: EquilibriumProblem) -> None:
         super().__init__("")
-        self.places, self.problem = tuple(places), problem
+        self.coordinate_indices, self.problem = tuple(places), problem
 
 
 @dataclass(frozen=True)
-class Rest:
+class EquilibriumProblem:
     """Equilibrium problem in n coordinates.
 
     Attributes:
@@ -70,27 +72,27 @@ class Rest:
         there: q -> the same problem in coordinates that are independent at that q.
     """
 
-    needed: Callable[[Array], Array]
-    moved: Callable[[Array, Array], Array]
+    required_efforts: Callable[[Array], Array]
+    move: Callable[[Array, Array], Array]
     sizes: Array
-    places: tuple[int, ...] = ()
-    there: Callable[[Array], Rest] | None = None
+    coordinate_indices: tuple[int, ...] = ()
+    problem_at: Callable[[Array], EquilibriumProblem] | None = None
 
-    def at(self, q: Array) -> Rest:
+    def at_state(self, q: Array) -> EquilibriumProblem:
         """Same problem in coordinates that are independent at q."""
-        return self if self.there is None else self.there(q)
+        return self if self.problem_at is None else self.problem_at(q)
 
     def efforts(self, q: Array) -> Array:
         """Efforts (n,) times characteristic scales, J; raises NumericalFailure if not finite."""
         with np.errstate(all="ignore"):
-            scaled_efforts = self.needed(q) * self.sizes
+            scaled_efforts = self.required_efforts(q) * self.sizes
         if not np.isfinite(scaled_efforts).all():
             raise NumericalFailure("the efforts of this state are not finite")
         return scaled_efforts
 
     def advance_state(self, q: Array, step: Array) -> Array:
         """Move q by a motion given in characteristic scales."""
-        return self.moved(q, step * self.sizes)
+        return self.move(q, step * self.sizes)
 
     def slope(self, q: Array, size: float = _COARSE_STEP) -> Array:
         """Stiffness (n, n) in J, by central differences."""
@@ -108,40 +110,43 @@ class Rest:
         )
 
 
-def find_determined_equilibrium(problem: Rest, q: Array, tolerance: float) -> Array:
-    """Find an equilibrium by `approached`; raises Undetermined if it has neutral directions."""
-    equilibrium_q = approached(problem, q, tolerance)
-    unstable_coordinates(problem.at(equilibrium_q), equilibrium_q)
+def find_determined_equilibrium(problem: EquilibriumProblem, q: Array, tolerance: float) -> Array:
+    """Find an equilibrium; UndeterminedEquilibriumError if it has neutral directions."""
+    equilibrium_q = find_equilibrium(problem, q, tolerance)
+    unstable_coordinates(problem.at_state(equilibrium_q), equilibrium_q)
     return equilibrium_q
 
 
-def approached(problem: Rest, q: Array, tolerance: float) -> Array:
+def find_equilibrium(problem: EquilibriumProblem, q: Array, tolerance: float) -> Array:
     """Find q at rest, to `tolerance` times the characteristic scales, or to rounding.
 
     Newton's method is applied to the whole load; if that fails, the unbalanced efforts at the start
-    act as external efforts, which are reduced to zero in load steps.  Raises Unsettled.
+    act as external efforts, which are reduced to zero in load steps.  Raises
+    EquilibriumNotFoundError.
     """
     try:
         return _solve_newton(problem, q, tolerance, _MAX_ITERATIONS, _descent_step)
-    except Unsettled as failure:
+    except EquilibriumNotFoundError as failure:
         try:
             return _solve_in_load_steps(problem, q, tolerance)
         except NumericalFailure:
             raise failure from None
 
 
-def _solve_in_load_steps(problem: Rest, q: Array, tolerance: float) -> Array:
-    missing_efforts = problem.needed(q)
+def _solve_in_load_steps(problem: EquilibriumProblem, q: Array, tolerance: float) -> Array:
+    missing_efforts = problem.required_efforts(q)
     load_fraction, load_step = 0.0, _INITIAL_LOAD_STEP
     while load_fraction < 1.0:
         target_fraction = min(1.0, load_fraction + load_step)
-        loaded_problem = Rest(
-            _with_external_efforts(problem.needed, (1 - target_fraction) * missing_efforts),
-            problem.moved,
+        loaded_problem = EquilibriumProblem(
+            _with_external_efforts(
+                problem.required_efforts, (1 - target_fraction) * missing_efforts
+            ),
+            problem.move,
             problem.sizes,
         )
         try:
-            q = _solve_newton(loaded_problem, q, tolerance, _MAX_ITERATIONS_OF_A_PART, _newton_step)
+            q = _solve_newton(loaded_problem, q, tolerance, _MAX_PART_ITERATIONS, _newton_step)
         except NumericalFailure:
             load_step /= 2
             if load_step < _MIN_LOAD_STEP:
@@ -165,18 +170,20 @@ Stepping = Callable[[Array, Array, Array, float], Array]
 
 
 def _solve_newton(
-    problem: Rest, q: Array, tolerance: float, iterations: int, stepping: Stepping
+    problem: EquilibriumProblem, q: Array, tolerance: float, iterations: int, stepping: Stepping
 ) -> Array:
     residual, step_length = problem.efforts(q), np.inf
     for k in range(iterations):
-        adapted_problem = problem.at(q)
+        adapted_problem = problem.at_state(q)
         if adapted_problem is not problem:
             problem, residual = adapted_problem, adapted_problem.efforts(q)
         is_near = step_length < _EXACT_STEP
         try:
             stiffness = problem.exact_slope(q) if is_near else problem.slope(q)
         except NumericalFailure as failure:
-            raise Unsettled(str(failure), residual / problem.sizes, problem) from None
+            raise EquilibriumNotFoundError(
+                str(failure), residual / problem.sizes, problem
+            ) from None
         scale = _stiffness_scale(stiffness, residual)
         if k >= _ITERATIONS_WITHOUT_POTENTIAL and _is_asymmetric(stiffness, scale):
             iterations = k
@@ -190,7 +197,7 @@ def _solve_newton(
         q, residual, is_decreasing = _line_search(problem, q, residual, step, scale)
         if not is_decreasing and step_length < _COARSE_STEP and _is_rounding(problem, q, residual):
             return q
-    raise Unsettled(
+    raise EquilibriumNotFoundError(
         f"not converged after {iterations} iterations", residual / problem.sizes, problem
     )
 
@@ -237,7 +244,7 @@ def _newton_step(slope: Array, residual: Array, scale: Array, _: float) -> Array
 
 
 def _line_search(
-    problem: Rest, q: Array, residual: Array, step: Array, scale: Array
+    problem: EquilibriumProblem, q: Array, residual: Array, step: Array, scale: Array
 ) -> tuple[Array, Array, bool]:
     """Line search: q after the step, the efforts there, and whether they have decreased.
 
@@ -268,7 +275,9 @@ def _line_search(
             return trial, efforts, size_after < size_before
         step, work = step / 2, work / 2
     if last_valid is None:
-        raise Unsettled("no step leads to another state", residual / problem.sizes, problem)
+        raise EquilibriumNotFoundError(
+            "no step leads to another state", residual / problem.sizes, problem
+        )
     return *last_valid, False
 
 
@@ -279,24 +288,26 @@ def _scaled_norm(residual: Array, scale: Array) -> float:
 # --- rounding -------------------------------------------------------------------------------------
 
 
-def _stiffness_and_noise(problem: Rest, q: Array) -> tuple[Array, Array]:
+def _stiffness_and_noise(problem: EquilibriumProblem, q: Array) -> tuple[Array, Array]:
     """Stiffness (n, n) in J, and its deviation between two difference quotients."""
     exact, fine = problem.exact_slope(q), problem.slope(q, _FINE_STEP)
     return exact, np.abs(exact - fine)
 
 
-def _is_rounding(problem: Rest, q: Array, residual: Array) -> bool:
+def _is_rounding(problem: EquilibriumProblem, q: Array, residual: Array) -> bool:
     """True if the remaining efforts are rounding errors of larger ones that cancel."""
     _, noise = _stiffness_and_noise(problem, q)
     return bool((np.abs(residual) <= 10 * _FINE_STEP * noise.max(axis=1, initial=0.0)).all())
 
 
-def unstable_coordinates(problem: Rest, q: Array) -> tuple[int, ...]:
+def unstable_coordinates(problem: EquilibriumProblem, q: Array) -> tuple[int, ...]:
     """Unstable coordinates of an equilibrium, by negative stiffness.
 
     Empty if efforts have no potential, because their stiffness then does not determine stability.
-    Raises Undetermined for directions with stiffness at rounding level relative to that of their
-    coordinates, and Unsettled for remaining efforts that no small motion removes: with a coordinate
+    Raises UndeterminedEquilibriumError for directions with stiffness at rounding level relative to
+    that of their coordinates, and EquilibriumNotFoundError for remaining efforts that no small
+    motion removes:
+        with a coordinate
     without stiffness, the scale of another one may be so large that steps become short far from
     equilibrium.
     """
@@ -311,18 +322,18 @@ def unstable_coordinates(problem: Rest, q: Array) -> tuple[int, ...]:
     spread = np.abs(directions) / root[:, None]
     uncertainty = 4 * np.einsum("ik,ij,jk->k", spread, noise, spread) + 1e-13
 
-    def moving(which: NDArray[np.bool_]) -> tuple[int, ...]:
+    def moving_indices(which: NDArray[np.bool_]) -> tuple[int, ...]:
         share = spread[:, which].max(axis=1, initial=0.0) * root
         return tuple(np.flatnonzero(share > 0.1).tolist())
 
     is_neutral = np.abs(values) <= uncertainty
     if is_neutral.any():
-        raise Undetermined(moving(is_neutral), problem)
+        raise UndeterminedEquilibriumError(moving_indices(is_neutral), problem)
     residual = problem.efforts(q)
     if np.abs(residual).max(initial=0.0) > len(stiffness) * _COARSE_STEP * np.abs(stiffness).max(
         initial=0.0
     ):
-        raise Unsettled(
+        raise EquilibriumNotFoundError(
             "steps become short far from equilibrium", residual / problem.sizes, problem
         )
-    return () if _is_asymmetric(stiffness, scale) else moving(values < 0)
+    return () if _is_asymmetric(stiffness, scale) else moving_indices(values < 0)

@@ -11,7 +11,7 @@ from mstmm.errors import NumericalFailure, SceneError
 from mstmm.risk import DeferredRisks, Risk, information
 
 from ..linear.operating_point.departure import find_departure
-from ..linear.operating_point.later import LaterStates
+from ..linear.operating_point.later_states import LaterStates
 from ..linear.validity import departure_risk
 from ..run.scene_system import SceneSystem
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .equilibrium import Equilibrium
 
 
-def check_lasting(
+def with_persistence_findings(
     model: CompiledScene, equilibrium: Equilibrium, t: float, linearise: Callable[[], Linear]
 ) -> Equilibrium:
     """Equilibrium at t (s), with a finding if it does not last.
@@ -51,7 +51,7 @@ def _drives_move(model: CompiledScene, equilibrium: Equilibrium, t: float) -> bo
     y = SceneSystem(engine).start(t, np.asarray(equilibrium), np.zeros(model.nu))
     q, u = y[None, : model.nq].copy(), y[None, model.nq : model.nq + model.nu].copy()
     _, a = engine.accelerations(t, q, u, engine.start_memory()[None])
-    first = system.places["u"]
+    first = system.first_indices["u"]
     driven = [int(first[place]) + k for place, k in system.driven]
     return bool(u[0, driven].any() or a[0, driven].any())
 

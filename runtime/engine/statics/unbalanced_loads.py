@@ -7,22 +7,22 @@ import numpy as np
 from mstmm.array_validation import Array
 from mstmm.errors import NumericalFailure, SceneError
 
-from .rest import Rest
+from .static_equilibrium import EquilibriumProblem
 
 #: Maximum number of coordinates, number of random states in addition to that of coordinates, and
 #: number of attempts per state.
-_MOST, _SPARE, _DRAWS = 200, 12, 2
+_MAX_COORDINATES, _SPARE, _DRAWS = 200, 12, 2
 #: Distances of the states, in characteristic scales: far enough to reach stops and the stiffness of
 #: soft springs.
 _NEAREST, FARTHEST = 0.1, 1e4
 #: Variation that counts as rounding: of efforts, relative to the largest ones, and of the load.
 _ROUNDING, _CONSTANT = 1e-9, 1e-6
 #: Smallest scale of the efforts of a coordinate, relative to the largest scale.
-_LEAST = 1e-5
+_MIN_EFFORT_SCALE = 1e-5
 
 
 def find_unbalanced_motion(
-    problem: Rest, q: Array, farthest: float = FARTHEST
+    problem: EquilibriumProblem, q: Array, farthest: float = FARTHEST
 ) -> tuple[Array, int] | None:
     """Motion (n,) with a constant non-zero load along it, and the number of states examined.
 
@@ -30,15 +30,15 @@ def find_unbalanced_motion(
     None if every load varies, or if too few of the states are valid.
     """
     count = len(problem.sizes)
-    if not 0 < count <= _MOST:
+    if not 0 < count <= _MAX_COORDINATES:
         return None
-    efforts = _drawn_efforts(problem, q, count + _SPARE, farthest)
+    efforts = _random_efforts(problem, q, count + _SPARE, farthest)
     if len(efforts) < count + _SPARE:
         return None
     scale = np.abs(efforts).max(axis=0)
     if not scale.any():
         return None
-    scale = np.maximum(scale, _LEAST * scale.max())
+    scale = np.maximum(scale, _MIN_EFFORT_SCALE * scale.max())
     rows = efforts / scale
     _, values, directions = np.linalg.svd(rows[1:] - rows[0])
     still = directions[values <= _ROUNDING * len(rows)]
@@ -49,7 +49,7 @@ def find_unbalanced_motion(
     return motion / scale * problem.sizes, len(efforts)
 
 
-def _drawn_efforts(problem: Rest, q: Array, count: int, farthest: float) -> Array:
+def _random_efforts(problem: EquilibriumProblem, q: Array, count: int, farthest: float) -> Array:
     """Efforts (k, n), J, at q and at random states around it, with k at most `count`."""
     draw, found = np.random.default_rng(0), [problem.efforts(q)]
     for _ in range(_DRAWS * count):

@@ -32,15 +32,15 @@ def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
     It applies if the model is at rest because no state was given.  With more than `most`
     coordinates any initial speed counts.
     """
-    if linear.at_speeds is None or not len(linear):
+    if linear.equations_at_speeds is None or not len(linear):
         return
     speeds = initial_state(linear.model)[1][list(linear.free_speed_indices)]
     if not speeds.any():
         return
-    plain = replace(linear, carrying=None)
+    plain = replace(linear, frame_transform=None)
     if len(linear) <= most:
-        speeds = _lasting(plain, speeds)
-        if not speeds.any() or not _matter(plain, speeds):
+        speeds = _persistent_speeds(plain, speeds)
+        if not speeds.any() or not _are_significant(plain, speeds):
             return
     moving = np.flatnonzero(np.abs(speeds) > _ROUNDING * np.abs(speeds).max())
     names = abbreviate_names(
@@ -60,7 +60,7 @@ def _fastest(linear: LinearEquations, speeds: Array) -> float:
     return float(np.abs(speeds / speed_scales(linear.model)[list(linear.free_speed_indices)]).max())
 
 
-def _lasting(linear: LinearEquations, speeds: Array) -> Array:
+def _persistent_speeds(linear: LinearEquations, speeds: Array) -> Array:
     """Part of the speeds (n,) that no stiffness or damping changes within a revolution."""
     scale = np.sqrt(linear.M.diagonal())
     fastest, stiffness = _fastest(linear, speeds), linear.K / np.outer(scale, scale)
@@ -71,11 +71,11 @@ def _lasting(linear: LinearEquations, speeds: Array) -> Array:
     return lasting if slowed < _SLOW * fastest * energy else np.zeros_like(lasting)
 
 
-def _matter(linear: LinearEquations, speeds: Array) -> bool:
+def _are_significant(linear: LinearEquations, speeds: Array) -> bool:
     """Whether the matrices at these speeds (n,) differ from those at rest."""
-    assert linear.at_speeds is not None
+    assert linear.equations_at_speeds is not None
     try:
-        beside = linear.at_speeds(linear.state.u + linear.expand(speeds))
+        beside = linear.equations_at_speeds(linear.state.u + linear.expand(speeds))
     except NumericalFailure:
         return True
     if not beside.has_stiffness or beside.free_speed_indices != linear.free_speed_indices:
