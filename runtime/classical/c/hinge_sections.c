@@ -65,3 +65,16 @@ void classical_axis(const real *axes, real *axis)
 {
     for (int i = 0; i < 3; i++) axis[i] = axes[3 * i + 2];
 }
+
+/* The axis of a pin: its inboard section's, or behind springs, which tilt it, its outboard one's. */
+void classical_pin_axis(const step_record *step, int index, real *axis)
+{
+    const section held = classical_section(step, index);
+    real axes[9];
+    if (step->run->bodies[index].hinge != MSTMM_CLASSICAL_ELASTIC_PIN) {
+        classical_axis(held.axes, axis);
+        return;
+    }
+    classical_outboard_axes(step, index, axes);
+    classical_axis(axes, axis);
+}

@@ -68,19 +68,6 @@ static int smooth(const step_record *step, int inner, int outer, const real *row
 #undef BY_SPACE
 }
 
-/* The axis of a pin: its inboard section's, or behind springs, which tilt it, its outboard one's. */
-void classical_pin_axis(const step_record *step, int index, real *axis)
-{
-    const section held = classical_section(step, index);
-    real axes[9];
-    if (step->run->bodies[index].hinge != MSTMM_CLASSICAL_ELASTIC_PIN) {
-        classical_axis(held.axes, axis);
-        return;
-    }
-    classical_outboard_axes(step, index, axes);
-    classical_axis(axes, axis);
-}
-
 static int pin(const step_record *step, int index, int inner, const real *rows, const real *modal,
                real *matrix)
 {
