@@ -1,11 +1,8 @@
-/* Common parts of the implicit methods: calls of the system, norm of their errors, and completion
- * of an accepted step. */
+/* Common parts of the implicit methods: calls of the system, and norms of their errors. */
 #include "implicit_step.h"
 
 #include <math.h>
 #include <string.h>
-
-#include "step.h"
 
 /* ---- the system ---- */
 
@@ -71,37 +68,6 @@ int mstmm_step_slope(const mstmm_work *work, double t, const double *row, double
   return status ? status : mstmm_check_finite(work, t, slope);
 }
 
-/* Accelerations at part c of a step of Newmark's family, to a row of its dense output: the slopes
- * of the speeds, so that the work of drives agrees with the change of speeds.  A fixed step may be
- * far too long for a vibration, so that dense output oscillates: there speeds are linear. */
-static int take_accelerations(const mstmm_work *work, double c, double t, double *row) {
-  const int n_q = work->implicit->n_q, fixed = work->run->fixed_step > 0.0;
-  const double *first = work->k + n_q, *last = first + work->tableau->n_stages * work->row;
-  double *a = mstmm_row_a(work, row);
-  for (int j = 0; j < work->implicit->n_u; j++) {
-    const double change = work->y_new[n_q + j] - work->y[n_q + j];
-    const double mean = change / work->run->real.h;
-    if (fixed) row[n_q + j] = work->y[n_q + j] + c * change;
-    a[j] = fixed ? mean
-                 : 6.0 * c * (1.0 - c) * mean + (1.0 - c) * (1.0 - 3.0 * c) * first[j] +
-                       c * (3.0 * c - 2.0) * last[j];
-  }
-  return mstmm_step_impose(work, t, row);
-}
-
-/* Rates of the quadratures at a state within the part c of the step */
-static int rates_of_quadratures(const mstmm_work *work, double c, double *row, double *to) {
-  const int rest = mstmm_n_rest(work);
-  const double t = mstmm_time_in(work->run, c);
-  if (work->tableau->kind == MSTMM_ALPHA) {
-    const int status = take_accelerations(work, c, t, row);
-    return status ? status : mstmm_step_residual(work, t, row, to);
-  }
-  const int status = mstmm_evaluate(work, t, row, work->y_event);
-  memcpy(to, work->y_event + work->system->n_state - rest, (size_t)rest * sizeof *to);
-  return status ? status : mstmm_check_finite(work, t, work->y_event);
-}
-
 int mstmm_check_new(const mstmm_work *work) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const double *a = mstmm_row_a(work, work->y_new), t = work->run->real.t_new;
@@ -110,82 +76,12 @@ int mstmm_check_new(const mstmm_work *work) {
   return mstmm_note(work->run, MSTMM_NOT_FINITE, 0, n_q + mstmm_first_not_finite(n_u, a), t);
 }
 
-/* ---- steps ---- */
-
 void mstmm_implicit_restart(const mstmm_work *work) {
   mstmm_run *run = work->run;
   memcpy(mstmm_row_a(work, work->y), work->k + work->implicit->n_q,
          (size_t)work->implicit->n_u * sizeof(double));
   run->real.h_previous = run->real.error_previous = 0.0;
   run->count.tangent_valid = run->count.history = 0;
-}
-
-int mstmm_implicit_stages(const mstmm_work *work) {
-  switch (work->tableau->kind) {
-    case MSTMM_ROSENBROCK: return mstmm_rosenbrock_stages(work);
-    case MSTMM_DIRK: return mstmm_dirk_stages(work);
-    case MSTMM_EXPONENTIAL: return mstmm_exponential_stages(work);
-    default: return mstmm_alpha_stages(work);
-  }
-}
-
-/* The error of quadrature i of the step: the highest difference of its rates, squared against
- * their size, which has the order of the rule where they are smooth and is their size where they
- * are not (R. Piessens and others, QUADPACK, 1983, use the same test).  It is stored where the
- * error estimate reads it; the last stage is known by then. */
-static void estimate_quadrature(const mstmm_work *work, int i) {
-  const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
-  const int rest = mstmm_n_rest(work), n = work->tableau->n_inner + 2, last = terms.count - 1;
-  double difference = 0.0, size = 0.0;
-  if (!work->tableau->n_errors) return;
-  for (int l = 0; l < n; l++) {
-    const double part = work->tableau->roughness[l] * work->nodes[l * rest + i];
-    difference += part;
-    size += fabs(part);
-  }
-  work->k[terms.columns[last] * work->row + work->system->n_state - rest + i] =
-      size > 0.0 ? difference * difference / size / terms.weights[last] : 0.0;
-}
-
-/* Quadratures over the step, and their dense output: from their rates at its ends, which the slopes
- * hold, and on the dense output of the motion between. */
-static int integrate_quadratures(const mstmm_work *work) {
-  const mstmm_tableau *tableau = work->tableau;
-  const int rest = mstmm_n_rest(work), first = work->system->n_state - rest;
-  const int n = tableau->n_inner + 2;
-  const size_t bytes = (size_t)rest * sizeof(double);
-  const double h = work->run->real.h;
-  memcpy(work->nodes, work->k + first, bytes);
-  memcpy(work->nodes + (n - 1) * rest, work->k + tableau->n_stages * work->row + first, bytes);
-  for (int l = 1; l < n - 1; l++) {
-    const double c = tableau->inner[l - 1];
-    mstmm_dense(work, work->run->real.t + c * h, work->y_stage);
-    const int status = rates_of_quadratures(work, c, work->y_stage, work->nodes + l * rest);
-    if (status) return status;
-  }
-  for (int i = 0; i < rest; i++) {
-    for (int j = 0; j < tableau->n_dense; j++) {
-      double sum = 0.0;
-      for (int l = 0; l < n; l++)
-        sum += tableau->quadrature[l * tableau->n_dense + j] * work->nodes[l * rest + i];
-      work->dense[j * work->row + first + i] = h * sum;
-    }
-    work->y_new[first + i] = work->y[first + i] + work->dense[first + i];
-    estimate_quadrature(work, i);
-  }
-  return mstmm_check_finite(work, work->run->real.t_new, work->y_new);
-}
-
-int mstmm_implicit_finish(const mstmm_work *work, int wants_dense) {
-  const mstmm_tableau *tableau = work->tableau;
-  const int rest = tableau->kind != MSTMM_DIRK && mstmm_n_rest(work);
-  int status = 0;
-  if (tableau->kind == MSTMM_ALPHA)
-    status = mstmm_step_slope(work, mstmm_time_in(work->run, 1.0), work->y_new,
-                              work->k + tableau->n_stages * work->row);
-  if (!status && (rest || wants_dense)) status = mstmm_build_dense(work);
-  if (!status && rest) status = integrate_quadratures(work);
-  return status;
 }
 
 /* ---- norms ---- */

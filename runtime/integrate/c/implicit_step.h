@@ -9,8 +9,6 @@
 /* The slope at the start of a step has just been evaluated: accelerations from it, and nothing else
  * is known. */
 void mstmm_implicit_restart(const mstmm_work *work);
-/* From the slope at the start to y_new and the error. */
-int mstmm_implicit_stages(const mstmm_work *work);
 /* What an accepted step needs besides: the slope at its end, quadratures, dense output if
  * wanted. */
 int mstmm_implicit_finish(const mstmm_work *work, int wants_dense);
@@ -18,7 +16,7 @@ double mstmm_implicit_norm(const mstmm_work *work, double *absolute);
 int64_t mstmm_implicit_worst(const mstmm_work *work);
 double mstmm_implicit_first_step(const mstmm_work *work, double interval);
 
-/* ---- the steppers ---- */
+/* ---- the steppers: from the slope at the start of a step to y_new and the error ---- */
 
 int mstmm_rosenbrock_stages(const mstmm_work *work);
 int mstmm_dirk_stages(const mstmm_work *work);
