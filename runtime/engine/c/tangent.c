@@ -6,7 +6,6 @@
 
 #include "across.h"
 #include "derivative_direction.h"
-#include "hinge_call.h"
 #include "sweep_steps.h"
 #include "cache_tiling.h"
 
@@ -149,60 +148,6 @@ int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const r
     const mstmm_parts parts = parts_of(at);
     return at->known && !(at->t < t) && !(at->t > t) && same(parts.q, q, model->nq)
            && same(parts.u, u, model->nu) && (!a || same(parts.a, a, model->nu));
-}
-
-int mstmm_hook_drive_slopes(mstmm_state *state)
-{
-    mstmm_state *slope = state->slope;
-    const mstmm_model *model = state->model;
-    const real *inputs[] = {&state->t, mstmm_input_numbers(state), &slope->t};
-    real *outputs[] = {mstmm_drive_values(slope)};
-    memcpy(mstmm_filled_q(slope), slope->q, (size_t)model->nq * sizeof(real));
-    memcpy(mstmm_filled_u(slope), slope->u, (size_t)model->nu * sizeof(real));
-    const int code = mstmm_tape_run(model->drive_slopes, inputs, mstmm_slots(slope), outputs);
-    if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code);
-    slope->q = mstmm_filled_q(slope);
-    slope->u = mstmm_filled_u(slope);
-    return 0;
-}
-
-int mstmm_hook_expression_slopes(mstmm_state *state)
-{
-    mstmm_state *slope = state->slope;
-    const real *inputs[] = {&state->t, state->q, state->u, mstmm_input_numbers(state),
-                            &slope->t, slope->q, slope->u};
-    real *outputs[] = {mstmm_values(slope)};
-    const int code = mstmm_tape_run(state->model->value_slopes, inputs, mstmm_slots(slope), outputs);
-    return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;
-}
-
-int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *tape, const real *length,
-                             const real *d_length, real *d_value)
-{
-    mstmm_state *slope = state->slope;
-    const real *inputs[] = {&state->t, state->q, state->u, length, mstmm_input_numbers(state),
-                            &slope->t, slope->q, slope->u, d_length};
-    real *outputs[] = {d_value};
-    return mstmm_tape_run(tape, inputs, mstmm_slots(slope), outputs);
-}
-
-int mstmm_hinge_rates_along(mstmm_state *state, const mstmm_body *body, int of_speeds, real *rows)
-{
-    const mstmm_state *slope = state->slope;
-    real R[9], d[3], H[36], v[3], w[3], c[6];
-    int code = 0;
-    for (int i = 0; !code && i < (of_speeds ? body->nu : body->nq); i++) {
-        if (of_speeds)
-            mstmm_aim_rate(state, body, i);
-        else
-            mstmm_aim_coordinate(state, body, i);
-        code = mstmm_hinge_slope_of(
-            state, body, .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
-            .d_q = slope->q + body->q, .d_u = slope->u + body->u, .d_R = R, .d_d = d, .d_H = H,
-            .d_v = v, .d_w = w, .d_c = c, .d_qdot = rows + i * body->nq);
-    }
-    mstmm_aim_nowhere(state, body);
-    return code;
 }
 
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
