@@ -41,4 +41,12 @@ void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system,
                               mstmm_group *group);
 /* cdef end */
 
+/* Notes the failure that a code of `fused` means; returns its reason. */
+static inline int mstmm_fused_failure(mstmm_scene_run *run, const mstmm_fused *fused, int code)
+{
+    const int *failure = fused->failures + 3 * (code - 1);
+    run->failure = (mstmm_failure){failure[0], failure[1], failure[2]};
+    return failure[0];
+}
+
 #endif
