@@ -10,7 +10,8 @@
 /* Unit solutions of all unknowns and their coupling matrix, for the factored tangent.  `negative`:
  * whether the determinant of the tree's tangent is negative. */
 int mstmm_across_factor(mstmm_tangent *at, int negative);
-/* x as from mstmm_tangent_solve; in addition rows change by `missing` (NULL: by zero). */
+/* x as from mstmm_tangent_solve, of a tangent that has kept what known increments need; in addition
+ * rows change by `missing` (NULL: by zero). */
 int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *known,
                        const real *missing, real *x);
 /* No multiplier changes along the present direction. */

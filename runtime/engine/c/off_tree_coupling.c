@@ -7,6 +7,53 @@
 /* Smallest pivot relative to its column. */
 #define NO_PIVOT 1e-13
 
+/* --- rows and own accelerations of closing hinges --- */
+
+static int64_t place_of_row(const mstmm_model *model, const mstmm_coupled_row *one)
+{
+    if (one->frame < 0) return model->loops + MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN;
+    const mstmm_closure *closure = model->looped[one->frame].closure;
+    return model->loops + closure->numbers + MSTMM_CLOSURE_L + one->direction;
+}
+
+void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own)
+{
+    memcpy(own, a, (size_t)at->model->nu * sizeof(real));
+    for (int k = 0; k < at->couplings->n_rows; k++)
+        if (at->couplings->rows[k].speed >= 0) a[at->couplings->rows[k].speed] = 0;
+}
+
+/* Residual; for a rotor its inertia times its acceleration minus the multiplier. */
+void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows)
+{
+    const mstmm_model *model = at->model;
+    for (int k = 0; k < at->couplings->n_rows; k++) {
+        const mstmm_coupled_row *one = &at->couplings->rows[k];
+        const real softness = one->row < 0 ? 0 : model->rows[one->row].softness;
+        if (softness > 0)
+            rows[k] = own[model->bodies[one->frame].u + one->direction]
+                      - softness * mstmm_row_numbers(model, workspace, one->row)[MSTMM_ROW_X];
+        else
+            rows[k] = workspace[place_of_row(model, one)]
+                      - (one->speed < 0 ? 0 : own[one->speed]);
+    }
+}
+
+void mstmm_keep_multipliers(const mstmm_model *model, real *workspace)
+{
+    for (int r = 0; r < model->n_rows; r++) mstmm_row_numbers(model, workspace, r)[MSTMM_ROW_X] = 0;
+}
+
+void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
+                   real *required)
+{
+    for (int k = 0; at->model->looped && k < at->couplings->n_rows; k++) {
+        const mstmm_coupled_row *one = &at->couplings->rows[k];
+        if (one->speed >= 0)
+            required[one->speed] = own[one->speed] - workspace[place_of_row(at->model, one)];
+    }
+}
+
 /* --- unknowns --- */
 
 /* Number of unknown changes of loads and efforts; rows of closing hinges follow them. */
@@ -261,12 +308,7 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
     const mstmm_band matrix = mstmm_across_band(at);
     const int m = at->n_coupled, first = n_changes(at);
     real *changes = mstmm_across_changes(at), *amounts = mstmm_across_ordered(at);
-    int code = 0;
-    if (known && !at->kept) { /* first call with known increments: more will follow */
-        at->keeps = 1;
-        code = mstmm_tangent_factor(at, at->rate, at->s, at->sq, at->kappa);
-    }
-    if (!code) code = solve_alone(at, r, known, -1, x);
+    int code = solve_alone(at, r, known, -1, x);
     if (code || !m) return code;
     code = changes_along(at, x, known, -1, changes);
     if (code) return code;
