@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "between.h"
+#include "event_bounds.h"
 #include "bounce.h"
 #include "control.h"
 #include "kernel_calls.h"

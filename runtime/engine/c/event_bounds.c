@@ -1,6 +1,6 @@
 /* Bounds of conditions between two evaluation times: first of the quantities that they read, from
  * values and rates at both, then of the conditions, by the tape over intervals. */
-#include "between.h"
+#include "event_bounds.h"
 
 #include <math.h>
 
