@@ -5,7 +5,7 @@
 
 const real classical_nothing[36] = {0};
 
-static void inertial(const motion *at, const real *per_mode, real *out)
+static void inertial_slopes(const motion *at, const real *per_mode, real *out)
 {
     real turn[3], tangent[9], rates[6];
     classical_multiply(3, 2, 1, per_mode, at->position + 6, turn);
@@ -20,11 +20,11 @@ slopes classical_slopes(const step_record *step, int index)
     const motion *motions = step->run->motions;
     slopes found = {{0}, {0}, classical_nothing, classical_nothing};
     if (modes_of(step, body->parent)) {
-        inertial(&motions[body->parent], body->slopes, found.inboard);
+        inertial_slopes(&motions[body->parent], body->slopes, found.inboard);
         found.eta_inboard = motions[body->parent].position + 6;
     }
     if (body->modes) {
-        inertial(&motions[index], body->held, found.outboard);
+        inertial_slopes(&motions[index], body->held, found.outboard);
         found.eta_outboard = motions[index].position + 6;
     }
     return found;

@@ -67,7 +67,7 @@ static int planar_springs(const step_record *step, int index, int outer, const r
 }
 
 /* out = axes^T b, 3 x columns */
-static void into(const real *axes, int columns, const real *b, real *out)
+static void project_on_axes(const real *axes, int columns, const real *b, real *out)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < columns; j++) {
@@ -79,7 +79,7 @@ static void into(const real *axes, int columns, const real *b, real *out)
 
 /* Coordinates and speeds of the hinge as its law has them: position in inboard axes, quaternion;
  * velocity and spin in outboard axes.  Also the elongation in inertial axes. */
-static void relative(const step_record *step, int index, const section *held, const real *axes,
+static void relative_motion(const step_record *step, int index, const section *held, const real *axes,
                      real *elongation, real *q, real *u)
 {
     const motion *at = &step->run->motions[index];
@@ -94,11 +94,11 @@ static void relative(const step_record *step, int index, const section *held, co
         moved[i] = at->speed[i] - held->speed[i] -
                    (held->spin[j] * elongation[k] - held->spin[k] * elongation[j]);
     }
-    into(held->axes, 1, elongation, q);
-    into(held->axes, 3, axes, rotation);
+    project_on_axes(held->axes, 1, elongation, q);
+    project_on_axes(held->axes, 3, axes, rotation);
     classical_quaternion(rotation, q + 3);
-    into(axes, 1, moved, u);
-    into(axes, 1, spin, u + 3);
+    project_on_axes(axes, 1, moved, u);
+    project_on_axes(axes, 1, spin, u + 3);
 }
 
 /* Force and moment of springs and dampers on the outboard section, inertial axes, by the very law
@@ -109,7 +109,7 @@ static void spring_load(const step_record *step, int index, const section *held,
     const body_record *body = &step->run->bodies[index];
     motion *at = &step->run->motions[index];
     real q[7], u[6], tau[6], energy, power, twist;
-    relative(step, index, held, axes, elongation, q, u);
+    relative_motion(step, index, held, axes, elongation, q, u);
     mstmm_sweep_laws_six(body->law, q, u, body->law_axes, classical_nothing, &at->twist, tau,
                          &energy, &power, &twist);
     at->twist = twist;

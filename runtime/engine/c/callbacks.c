@@ -48,7 +48,7 @@ static void remember_twists(mstmm_scene_run *run, const real *y)
 }
 
 /* Unit quaternions, driven values, and closed loops. */
-static int put_in_order(mstmm_scene_run *run, real t, real *y)
+static int project_state(mstmm_scene_run *run, real t, real *y)
 {
     const mstmm_model *model = run->model;
     mstmm_unit_quaternions(run->n_quaternions, run->quaternions, y);
@@ -59,7 +59,7 @@ static int put_in_order(mstmm_scene_run *run, real t, real *y)
 
 int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
 {
-    const int code = put_in_order(run, t, y);
+    const int code = project_state(run, t, y);
     if (code) return code;
     remember_twists(run, y);
     if (run->base) run->base->known = 0;
@@ -95,19 +95,19 @@ static int scene_accept(void *context, double t, double *y)
 }
 
 /* A state inside a step, to be projected, after the numbers of the probes. */
-static int seen_inside(mstmm_scene_run *run, real t, const real **y)
+static int project_inside(mstmm_scene_run *run, real t, const real **y)
 {
     real *own = run->probe_values + 6 * run->n_probes + MSTMM_PROBE_NUMBERS;
     if (!run->closes) return 0;
     memcpy(own, *y, (size_t)(run->model->nq + run->model->nu) * sizeof(real));
     *y = own;
-    return put_in_order(run, t, own);
+    return project_state(run, t, own);
 }
 
 static int scene_events(void *context, double t, const double *y, double *g)
 {
     mstmm_scene_run *run = context;
-    int code = seen_inside(run, t, &y);
+    int code = project_inside(run, t, &y);
     const real *u = y + run->model->nq;
     mstmm_state state = {.model = run->model, .workspace = run->workspace, .t = t,
                          .memory = run->memory, .observed = 1, .failure = &run->failure};
@@ -132,7 +132,7 @@ static int scene_fire(void *context, int event, double t, double *y)
 
 static int scene_lets_through(void *context, int event, double t, const double *y, double g)
 {
-    return seen_inside(context, t, &y) ? 0 : mstmm_lets_through(context, event, t, y, g);
+    return project_inside(context, t, &y) ? 0 : mstmm_lets_through(context, event, t, y, g);
 }
 
 /* True if there is anything to do after a step. */

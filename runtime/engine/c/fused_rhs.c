@@ -21,7 +21,7 @@ int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes)
     return one->nu + closing_size(one) + width * (one->nu + one->np + one->n_memory);
 }
 
-static void repeat(int64_t count, int lanes, const real *from, real *to)
+static void repeat_in_lanes(int64_t count, int lanes, const real *from, real *to)
 {
     for (int64_t i = 0; i < count; i++)
         for (int j = 0; j < lanes; j++) to[i * lanes + j] = from[i];
@@ -50,10 +50,10 @@ void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const ms
     run->fused_p = p;
     run->fused_numbers = numbers;
     memset(numbers, 0, (size_t)mstmm_compiled_size(one, lanes) * sizeof *numbers);
-    if (run->fused_lanes) repeat(one->np, lanes->lanes, p, lanes_p(run));
+    if (run->fused_lanes) repeat_in_lanes(one->np, lanes->lanes, p, lanes_p(run));
 }
 
-static int accelerations(void *context, double t, const double *y, double *dy)
+static int fused_rhs(void *context, double t, const double *y, double *dy)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
@@ -66,14 +66,14 @@ static int accelerations(void *context, double t, const double *y, double *dy)
     return code ? mstmm_fused_failure(run, fused, code) : 0;
 }
 
-static int accelerations_and_power(void *context, double t, const double *y, double *dy)
+static int fused_rhs_with_power(void *context, double t, const double *y, double *dy)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     real power = 0, potential;
     if (!fused->accelerations_power) { /* only impacts do work */
         dy[fused->nq + fused->nu] = 0;
-        return accelerations(context, t, y, dy);
+        return fused_rhs(context, t, y, dy);
     }
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const double *u = y + fused->nq;
@@ -86,13 +86,13 @@ static int accelerations_and_power(void *context, double t, const double *y, dou
     return code ? mstmm_fused_failure(run, fused, code) : 0;
 }
 
-static int accelerations_in_lanes(void *context, const double *t, const double *y, double *dy,
+static int fused_rhs_in_lanes(void *context, const double *t, const double *y, double *dy,
                                   int *codes)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused_lanes;
     const int64_t start = (int64_t)fused->nq * fused->lanes;
-    if (fused->n_memory) repeat(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
+    if (fused->n_memory) repeat_in_lanes(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
     const int any = fused->accelerations_lanes(lanes_p(run), t, y, y + start, lanes_memory(run),
                                                lanes_efforts(run), dy, dy + start, codes);
     for (int lane = 0; any && lane < fused->lanes; lane++)
@@ -104,15 +104,15 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
 {
     mstmm_looped_system(run, system);
     if (!run->fused) return;
-    system->rhs = run->with_power ? accelerations_and_power : accelerations;
+    system->rhs = run->with_power ? fused_rhs_with_power : fused_rhs;
     if (!run->fused_lanes) return;
     system->lanes = run->fused_lanes->lanes;
-    system->rhs_lanes = accelerations_in_lanes;
+    system->rhs_lanes = fused_rhs_in_lanes;
 }
 
 /* --- trajectories in SIMD lanes ----------------------------------------------------------- */
 
-static int settle_one(void *context, double t, double *y)
+static int settle_lane(void *context, double t, double *y)
 {
     mstmm_scene_lanes *lanes = context;
     return mstmm_scene_settle(lanes->settle, t, y);
@@ -135,7 +135,7 @@ static void renew_lanes(const mstmm_scene_lanes *lanes, const double *t)
 
 /* mstmm_stage_speeds of one lane, in place among those of all.  Where there are none they stay:
  * what is evaluated with them says why. */
-static void stage_speeds_of(const mstmm_scene_lanes *lanes, int lane, real t, const real *y, real *speeds,
+static void project_lane_speeds(const mstmm_scene_lanes *lanes, int lane, real t, const real *y, real *speeds,
                             real *one)
 {
     mstmm_scene_run *run = lanes->settle;
@@ -160,7 +160,7 @@ static const real *lanes_speeds(const mstmm_scene_lanes *lanes, const double *t,
     if (!any) return u;
     memcpy(speeds, u, (size_t)(width * nu) * sizeof(real));
     for (int lane = 0; lane < width; lane++)
-        if (lanes->near[lane]) stage_speeds_of(lanes, lane, t[lane], y, speeds, speeds + width * nu);
+        if (lanes->near[lane]) project_lane_speeds(lanes, lane, t[lane], y, speeds, speeds + width * nu);
     return speeds;
 }
 
@@ -185,7 +185,7 @@ static void lanes_enter(void *context, int lane, int64_t trajectory)
         lanes->numbers[i * lanes->fused->lanes + lane] = p[i];
 }
 
-static void lanes_accepted(void *context, int lane)
+static void lanes_accept(void *context, int lane)
 {
     mstmm_scene_lanes *lanes = context;
     const mstmm_scene_run *run = lanes->settle;
@@ -202,10 +202,10 @@ void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, ms
     mstmm_scene_system(lanes->settle, system);
     memset(lanes->numbers, 0, (size_t)mstmm_lanes_numbers(lanes->fused) * sizeof(real));
     system->context = lanes;
-    if (system->accept) system->accept = settle_one;
+    if (system->accept) system->accept = settle_lane;
     system->lanes = lanes->fused->lanes;
     system->rhs_lanes = lanes_rhs;
     group->system = system;
     group->enter = lanes_enter;
-    group->accepted = lanes_accepted;
+    group->accepted = lanes_accept;
 }

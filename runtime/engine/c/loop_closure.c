@@ -21,7 +21,7 @@ static real *row_numbers(const mstmm_state *state, int row)
 }
 
 /* True if a row is inactive now. */
-static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
+static int is_released(const mstmm_state *state, const mstmm_loop_row *row)
 {
     if (row->of_speeds && state->level == MSTMM_GAP) return 1;
     return row->release >= 0 && fabs(state->memory[row->release]) > 0;
@@ -43,7 +43,7 @@ int mstmm_hook_rows_begun(mstmm_state *state)
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
         row_numbers(state, r)[MSTMM_ROW_PIVOT] =
-            let_go(state, row) || mstmm_rests(state, row)
+            is_released(state, row) || mstmm_rests(state, row)
                 ? (real)INFINITY
                 : row->softness + state->give * row->mobility;
     }
@@ -191,7 +191,7 @@ void mstmm_unit_quaternions(int count, const int *first, real *q)
 /* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; where
  * `repeated`, of what the others lack: they say what some of these say, and follow by themselves.
  * *where is the frame of its hinge, or the number of a coupling behind those of all bodies. */
-static real largest(const mstmm_state *state, int repeated, int *where)
+static real largest_row_error(const mstmm_state *state, int repeated, int *where)
 {
     const mstmm_model *model = state->model;
     real found = 0;
@@ -202,7 +202,7 @@ static real largest(const mstmm_state *state, int repeated, int *where)
             state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
         for (int c = 0; c < 6; c++) {
             const int row = closure->rows[c];
-            if (row < -1 || (row >= 0 && let_go(state, &model->rows[row]))) continue;
+            if (row < -1 || (row >= 0 && is_released(state, &model->rows[row]))) continue;
             const int counts = row >= 0 ? row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0
                                         : c < model->bodies[i].nu;
             if (counts == repeated || fabs(known[c]) <= found) continue;
@@ -240,8 +240,8 @@ static int looped_gaps(void *context, mstmm_gaps *found)
     int code = mstmm_correction(at->model, at->workspace, MSTMM_GAP, 0, at->t, at->q, at->u,
                                 at->memory, at->change, NULL, at->failure);
     if (code) return code;
-    found->met = largest(&state, 0, &found->where_met);
-    found->repeated = largest(&state, 1, &found->where_repeated);
+    found->met = largest_row_error(&state, 0, &found->where_met);
+    found->repeated = largest_row_error(&state, 1, &found->where_repeated);
     return mstmm_moved(at->model, at->workspace, at->t, at->q, at->change, at->memory,
                        at->n_quaternions, at->quaternions, at->failure);
 }

@@ -8,7 +8,7 @@
 #include "scene.h"
 #include "sweep_steps.h"
 
-static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, const real *memory,
+static mstmm_state observed_state(const mstmm_model *model, real *workspace, real t, const real *memory,
                             mstmm_failure *failure)
 {
     return (mstmm_state){.model = model, .workspace = workspace, .t = t, .memory = memory,
@@ -16,7 +16,7 @@ static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, c
 }
 
 /* State as `mstmm_accelerations_kept` left it: coordinates filled, hinges known, poses computed. */
-static int complete(mstmm_state *state, const real *q, const real *u)
+static int complete_state(mstmm_state *state, const real *q, const real *u)
 {
     const mstmm_model *model = state->model;
     state->q = model->n_drives ? mstmm_filled_q(state) : q;
@@ -128,12 +128,12 @@ static void observe_sums(mstmm_state *state, const mstmm_balance *balance, real 
 int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real *q, const real *u,
                   const real *memory, const mstmm_observation *wanted, mstmm_failure *failure)
 {
-    mstmm_state state = state_of(model, workspace, t, memory, failure);
+    mstmm_state state = observed_state(model, workspace, t, memory, failure);
     mstmm_balance balance;
     real *qdot = mstmm_spare_qdot(&state), *udot = mstmm_spare_udot(&state);
     int code =
         mstmm_accelerations_kept(model, workspace, t, q, u, memory, qdot, udot, &balance, failure);
-    if (!code) code = complete(&state, q, u);
+    if (!code) code = complete_state(&state, q, u);
     if (code) return code;
     if (wanted->udot) memcpy(wanted->udot, udot, (size_t)model->nu * sizeof(real));
     if (wanted->points)
@@ -173,11 +173,11 @@ int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n,
 {
     int code = 0;
     for (int64_t k = 0; k < n && !code; k++) {
-        mstmm_state state = state_of(model, workspace, 0, memory, failure);
+        mstmm_state state = observed_state(model, workspace, 0, memory, failure);
         real inertia[21], momentum[6];
         code = mstmm_inverse_dynamics(model, workspace, 0, q, u + k * model->nu, memory, still,
                                       efforts, failure);
-        if (!code) code = complete(&state, q, u + k * model->nu);
+        if (!code) code = complete_state(&state, q, u + k * model->nu);
         for (int i = 0; i < model->n_bodies && !code; i++)
             energies[k * model->n_bodies + i] = kinetic_energy(&state, i, inertia, momentum);
     }
@@ -203,9 +203,9 @@ int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t 
 /* --- states of a run --- */
 
 /* Poses and velocities of all bodies of a state with speeds u, to be read from `state`. */
-static int moved(mstmm_scene_run *run, real t, const real *y, const real *u, mstmm_state *state)
+static int motion_state(mstmm_scene_run *run, real t, const real *y, const real *u, mstmm_state *state)
 {
-    *state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
+    *state = observed_state(run->model, run->workspace, t, run->memory, &run->failure);
     state->q = y;
     state->u = u;
     state->qdot = mstmm_spare_qdot(state);
@@ -218,7 +218,7 @@ int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u
     if (!run->n_probes) return 0;
     real *one = run->probe_values + 6 * run->n_probes;
     mstmm_state state;
-    const int code = moved(run, t, y, u, &state);
+    const int code = motion_state(run, t, y, u, &state);
     if (code) return code;
     for (int k = 0; k < run->n_probes; k++) {
         observe_probe(&state, &run->probes[k], one);
@@ -231,7 +231,7 @@ int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *
 {
     mstmm_state state;
     real inertia[21], momentum[6];
-    const int code = moved(run, t, y, u, &state);
+    const int code = motion_state(run, t, y, u, &state);
     *energy = 0;
     for (int i = 0; i < run->model->n_bodies && !code; i++)
         *energy += kinetic_energy(&state, i, inertia, momentum);

@@ -201,7 +201,7 @@ static int ground_state(const mstmm_state *state, const real *overall, int alone
 
 /* --- matrices and states along the chain --- */
 
-static void multiply(const real *a, const real *b, real *out)
+static void multiply_transfer(const real *a, const real *b, real *out)
 {
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++) {
@@ -211,7 +211,7 @@ static void multiply(const real *a, const real *b, real *out)
         }
 }
 
-static void apply(const real *a, const real *z, real *out)
+static void apply_transfer(const real *a, const real *z, real *out)
 {
     for (int i = 0; i < N; i++) {
         out[i] = 0;
@@ -276,7 +276,7 @@ static int hinge_matrix(const mstmm_state *state, int index, int alone, real *st
 }
 
 /* Load on a body: what acts, and what the multipliers of closed loops put there. */
-static void load_on(const mstmm_state *state, int index, int which, real *load)
+static void chain_load(const mstmm_state *state, int index, int which, real *load)
 {
     const mstmm_model *model = state->model;
     memset(load, 0, 6 * sizeof(real));
@@ -298,7 +298,7 @@ static void load_on(const mstmm_state *state, int index, int which, real *load)
 }
 
 /* Overall matrix of the chain, those of its elements kept. */
-static int multiplied(mstmm_state *state, int which, real *overall)
+static int multiply_chain(mstmm_state *state, int which, real *overall)
 {
     real step[N * N], load[6];
     memset(overall, 0, N * N * sizeof(real));
@@ -306,12 +306,12 @@ static int multiplied(mstmm_state *state, int which, real *overall)
     for (int i = next_in_chain(state->model, -1); i >= 0;
          i = next_in_chain(state->model, i)) {
         real *store = chain_numbers(state, i);
-        load_on(state, i, which, load);
+        chain_load(state, i, which, load);
         body_matrix(state, i, load, which >= 0, store);
         const int code = hinge_matrix(state, i, which >= 0, store);
         if (code) return mstmm_fail(state, MSTMM_FAILED_PRODUCT_PIVOT, i, code);
-        multiply(store + HINGE, overall, step);
-        multiply(store + BODY, step, overall);
+        multiply_transfer(store + HINGE, overall, step);
+        multiply_transfer(store + BODY, step, overall);
     }
     return 0;
 }
@@ -322,7 +322,7 @@ static int solve_chain(mstmm_state *state, int which)
     const mstmm_model *model = state->model;
     const int alone = which >= 0;
     real overall[N * N], z[N], next[N];
-    const int code = multiplied(state, which, overall);
+    const int code = multiply_chain(state, which, overall);
     if (code) return code;
     if (ground_state(state, overall, alone, z))
         return mstmm_fail(state, MSTMM_FAILED_PRODUCT_ERROR, 0, 1);
@@ -331,7 +331,7 @@ static int solve_chain(mstmm_state *state, int which)
         const mstmm_body *body = &model->bodies[i];
         real *store = chain_numbers(state, i);
         real *block = state->workspace + body->block;
-        apply(store + HINGE, z, next);
+        apply_transfer(store + HINGE, z, next);
         mstmm_frames_state_deviation(.A = block + MSTMM_BLOCK_A,
                                      .motion = alone ? mstmm_zeros : block + MSTMM_BLOCK_MOTION,
                                      .z = next, .delta = store + STATE);
@@ -341,29 +341,29 @@ static int solve_chain(mstmm_state *state, int which)
                               .delta = store + STATE, .delta_I = parent,
                               .udot = chain_accelerations(state) + body->u);
         parent = store + STATE;
-        apply(store + BODY, next, z);
+        apply_transfer(store + BODY, next, z);
     }
     return 0;
 }
 
 /* --- closed loops --- */
 
-static const real *numbers_of(const mstmm_state *state, int frame, int64_t first)
+static const real *closure_numbers(const mstmm_state *state, int frame, int64_t first)
 {
     return state->workspace + state->model->loops + state->model->looped[frame].closure->numbers +
            first;
 }
 
 /* Acceleration of the chain along a direction of a closing hinge. */
-static real along(const mstmm_state *state, int frame, int direction, int alone)
+static real acceleration_along(const mstmm_state *state, int frame, int direction, int alone)
 {
     const int ends[] = {state->model->bodies[frame].parent,
                         state->model->looped[frame].closure->outboard};
     const int64_t columns[] = {MSTMM_CLOSURE_J_A, MSTMM_CLOSURE_J_B};
-    real found = alone ? 0 : numbers_of(state, frame, MSTMM_CLOSURE_L)[direction];
+    real found = alone ? 0 : closure_numbers(state, frame, MSTMM_CLOSURE_L)[direction];
     for (int side = 0; side < 2; side++) {
         if (ends[side] < 0) continue;
-        const real *row = numbers_of(state, frame, columns[side]) + 6 * direction;
+        const real *row = closure_numbers(state, frame, columns[side]) + 6 * direction;
         const real *moved = chain_numbers(state, ends[side]) + STATE;
         for (int j = 0; j < 6; j++) found += row[j] * moved[j];
     }
@@ -378,25 +378,25 @@ static void add_efforts(const mstmm_state *state, int frame)
     const int64_t columns[] = {MSTMM_CLOSURE_J_A, MSTMM_CLOSURE_J_B};
     for (int side = 0; side < 2; side++)
         for (int k = 0; k < own->nu && ends[side] >= 0; k++) {
-            const real *row = numbers_of(state, frame, columns[side]) + 6 * k;
+            const real *row = closure_numbers(state, frame, columns[side]) + 6 * k;
             real *load = chain_numbers(state, ends[side]) + LOAD;
             for (int j = 0; j < 6; j++) load[j] += row[j] * hinge_tau(state, frame)[k];
         }
 }
 
 /* One column of the equations: response of all rows to a load. */
-static void column(const mstmm_state *state, int which, real *system, int at, int width)
+static void fill_column(const mstmm_state *state, int which, real *system, int at, int width)
 {
     const mstmm_model *model = state->model;
     for (int i = 0; i < model->n_bodies; i++)
         for (int c = 0; c < 6 && model->looped[i].closure; c++) {
             const int row = model->looped[i].closure->rows[c];
-            if (row >= 0) system[row * width + at] = along(state, i, c, which >= 0);
+            if (row >= 0) system[row * width + at] = acceleration_along(state, i, c, which >= 0);
         }
 }
 
 /* x of A x = -b from rows [A | b], by elimination with pivots in columns.  Nonzero: singular. */
-static int solved(int n, real *system, real *x)
+static int solve_rows(int n, real *system, real *x)
 {
     const int width = n + 1;
     for (int k = 0; k < n; k++) {
@@ -438,14 +438,14 @@ static int solve_closed_chain(mstmm_state *state, real *open)
         code = solve_chain(state, which < 0 ? ACTING : which);
         for (int k = 0; k < model->nu && which < 0; k++)
             *open = fmax(*open, fabs(chain_accelerations(state)[k]));
-        if (!code) column(state, which, system, which < 0 ? rows : which, rows + 1);
+        if (!code) fill_column(state, which, system, which < 0 ? rows : which, rows + 1);
     }
-    if (!code && solved(rows, system, x))
+    if (!code && solve_rows(rows, system, x))
         return mstmm_fail(state, MSTMM_FAILED_PRODUCT_PIVOT, last, 1);
     if (!code) code = solve_chain(state, HELD);
     for (int i = 0; i < model->n_bodies && !code; i++)
         for (int k = 0; k < model->bodies[i].nu && model->looped[i].closure; k++)
-            chain_accelerations(state)[model->bodies[i].u + k] = along(state, i, k, 0);
+            chain_accelerations(state)[model->bodies[i].u + k] = acceleration_along(state, i, k, 0);
     return code;
 }
 

@@ -15,14 +15,14 @@ typedef struct {
 } compiled_state;
 
 /* Element index of an open loop: frame of closure k; couplings follow all bodies. */
-static int frame_of(const mstmm_model *model, int k)
+static int closure_frame(const mstmm_model *model, int k)
 {
     for (int i = 0; i < model->n_bodies; i++)
         if (model->looped[i].closure && k-- == 0) return i;
     return model->n_bodies + k;
 }
 
-static real largest(const mstmm_scene_run *run, const real *gaps, int *where)
+static real largest_gap(const mstmm_scene_run *run, const real *gaps, int *where)
 {
     real found = 0;
     int at = 0;
@@ -31,7 +31,7 @@ static real largest(const mstmm_scene_run *run, const real *gaps, int *where)
         found = fabs(gaps[k]);
         at = k / 6;
     }
-    if (found > 0) *where = frame_of(run->model, at);
+    if (found > 0) *where = closure_frame(run->model, at);
     return found;
 }
 
@@ -45,8 +45,8 @@ static int compiled_gaps(void *context, mstmm_gaps *found)
     const int code = fused->gaps(run->fused_p, &at->t, at->y, at->y + fused->nq, run->memory,
                                  run->fused_numbers, dq, gap, apart);
     if (code) return mstmm_fused_failure(run, fused, code);
-    found->met = largest(run, gap, &found->where_met);
-    found->repeated = largest(run, apart, &found->where_repeated);
+    found->met = largest_gap(run, gap, &found->where_met);
+    found->repeated = largest_gap(run, apart, &found->where_repeated);
     for (int i = 0; i < fused->nq; i++) at->y[i] += dq[i];
     mstmm_unit_quaternions(run->n_quaternions, run->quaternions, at->y);
     return 0;

@@ -23,7 +23,7 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
                    mstmm_balance *balance)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     at->t = t;
     memcpy(parts.q, q, (size_t)model->nq * sizeof(real));
     memcpy(parts.u, u, (size_t)model->nu * sizeof(real));
@@ -34,7 +34,7 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
                                    parts.qdot, parts.a, NULL, &at->failure);
     if (a) memcpy(parts.a, a, (size_t)model->nu * sizeof(real));
     if (model->looped) mstmm_set_own_apart(at, parts.a, parts.answer);
-    mstmm_state state = state_of(at, &parts);
+    mstmm_state state = tangent_state(at, &parts);
     state.balance = balance;
     if (balance) balance->power = balance->potential = 0;
     mstmm_ground(&state);
@@ -48,7 +48,7 @@ int mstmm_residual(mstmm_tangent *at, real t, const real *q, const real *u, cons
     return 0;
 }
 
-static int same(const real *one, const real *other, int n)
+static int equal_numbers(const real *one, const real *other, int n)
 {
     return !memcmp(one, other, (size_t)n * sizeof(real));
 }
@@ -57,16 +57,16 @@ int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const r
                          const real *a)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
-    return at->known && !(at->t < t) && !(at->t > t) && same(parts.q, q, model->nq)
-           && same(parts.u, u, model->nu) && (!a || same(parts.a, a, model->nu));
+    const mstmm_parts parts = tangent_parts(at);
+    return at->known && !(at->t < t) && !(at->t > t) && equal_numbers(parts.q, q, model->nq)
+           && equal_numbers(parts.u, u, model->nu) && (!a || equal_numbers(parts.a, a, model->nu));
 }
 
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
                          const real *d_a, real *d_r)
 {
-    const mstmm_parts parts = parts_of(at);
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, d_r);
+    const mstmm_parts parts = tangent_parts(at);
+    mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, d_r);
     memmove(parts.d_a, d_a, (size_t)at->model->nu * sizeof(real));
     mstmm_set_own_apart(at, parts.d_a, parts.answer);
     slope.t = d_t;
@@ -84,7 +84,7 @@ int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const rea
 
 /* --- tangent --- */
 
-static void take_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa)
+static void set_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
     at->rate = rate;
     at->s = s;
@@ -96,10 +96,10 @@ static void take_steps(mstmm_tangent *at, real rate, real s, real sq, real kappa
 static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negative, int kept)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
                            .kappa = at->kappa, .negative = negative, .kept = kept};
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
     at->laws_alone = 0;
@@ -113,13 +113,13 @@ static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negati
 
 int mstmm_tangent_brought(mstmm_tangent *at, real rate, real s, real sq)
 {
-    take_steps(at, rate, s, sq, 0);
+    set_steps(at, rate, s, sq, 0);
     return run_tangent(at, mstmm_run_tangent_brought, NULL, 1);
 }
 
 int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
-    take_steps(at, rate, s, sq, kappa);
+    set_steps(at, rate, s, sq, kappa);
     /* Without couplings a body that they stabilise may be unstable. */
     int negative = 0;
     /* If loads need poses, all bodies are initialised before the first elimination. */
@@ -132,7 +132,7 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
 /* --- tangent of laws alone --- */
 
 /* Unknown are accelerations: of the increments they are what carries the others along. */
-static mstmm_tangents steps_of_laws(const mstmm_tangent *at)
+static mstmm_tangents laws_steps(const mstmm_tangent *at)
 {
     return (mstmm_tangents){.numbers = at->numbers, .rate = at->rate / at->s, .s = 1,
                             .sq = at->s * at->sq, .laws_alone = 1};
@@ -141,11 +141,11 @@ static mstmm_tangents steps_of_laws(const mstmm_tangent *at)
 int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
-    take_steps(at, rate, s, sq, kappa);
+    const mstmm_parts parts = tangent_parts(at);
+    set_steps(at, rate, s, sq, kappa);
     at->laws_alone = 1;
-    mstmm_tangents step = steps_of_laws(at);
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    mstmm_tangents step = laws_steps(at);
+    mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
@@ -156,9 +156,9 @@ int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)
 
 int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const real *du, real *a)
 {
-    const mstmm_parts parts = parts_of(at);
-    mstmm_tangents step = steps_of_laws(at);
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    const mstmm_parts parts = tangent_parts(at);
+    mstmm_tangents step = laws_steps(at);
+    mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
     state.column = r;
@@ -174,7 +174,7 @@ int mstmm_laws_solve(mstmm_tangent *at, const real *r, const real *dq, const rea
 
 /* --- solutions --- */
 
-static int solve_by_laws(mstmm_tangent *at, const real *r, real *du)
+static int solve_speeds_by_laws(mstmm_tangent *at, const real *r, real *du)
 {
     const int code = mstmm_laws_solve(at, r, NULL, NULL, du);
     for (int j = 0; j < at->model->nu; j++) du[j] /= at->s;
@@ -184,7 +184,7 @@ static int solve_by_laws(mstmm_tangent *at, const real *r, real *du)
 int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *known, real *x)
 {
     int code = 0;
-    if (at->laws_alone) return solve_by_laws(at, r, x);
+    if (at->laws_alone) return solve_speeds_by_laws(at, r, x);
     if (known && !at->kept) { /* first call with known increments: more will follow */
         at->keeps = 1;
         code = mstmm_tangent_factor(at, at->rate, at->s, at->sq, at->kappa);
@@ -198,7 +198,7 @@ int mstmm_tangent_solve(mstmm_tangent *at, const real *r, const mstmm_known *kno
 int mstmm_accelerations_rate(mstmm_tangent *at, real *rate)
 {
     const int nq = at->model->nq, nu = at->model->nu;
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     real *missing = mstmm_across_missing(at);
     memset(parts.d_q, 0, (size_t)nq * sizeof(real));
     memset(parts.d_u, 0, (size_t)nu * sizeof(real));

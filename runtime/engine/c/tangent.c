@@ -65,12 +65,12 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
 
 int64_t mstmm_tangent_work(const mstmm_model *model, int64_t slots)
 {
-    return cut(model, slots, NULL).used;
+    return cut_tangent_work(model, slots, NULL).used;
 }
 
 int64_t mstmm_residual_work(const mstmm_model *model)
 {
-    return cut(model, 0, NULL).used_by_residual;
+    return cut_tangent_work(model, 0, NULL).used_by_residual;
 }
 
 /* Prescribed speeds have no equations. */
@@ -109,7 +109,7 @@ int64_t mstmm_tangent_pivots(const mstmm_tangent *at, int *sizes, real *pivots)
 }
 
 /* Prescribed coordinates and speeds do not change and have no rates. */
-static void without_imposed_coordinates(const mstmm_model *model, const real *memory, real *dq)
+static void clear_imposed_coordinates(const mstmm_model *model, const real *memory, real *dq)
 {
     for (int i = 0; model->n_imposed && i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
@@ -124,15 +124,15 @@ static void without_imposed_coordinates(const mstmm_model *model, const real *me
 
 void mstmm_rates_slope(const mstmm_tangent *at, real *d_rates)
 {
-    memcpy(d_rates, parts_of(at).d_qdot, (size_t)at->model->nq * sizeof(real));
-    without_imposed_coordinates(at->model, at->memory, d_rates);
+    memcpy(d_rates, tangent_parts(at).d_qdot, (size_t)at->model->nq * sizeof(real));
+    clear_imposed_coordinates(at->model, at->memory, d_rates);
 }
 
 int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *dq)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
-    mstmm_state state = state_of(at, &parts);
+    const mstmm_parts parts = tangent_parts(at);
+    mstmm_state state = tangent_state(at, &parts);
     state.q = q;
     state.u = u;
     state.qdot = dq;
@@ -147,13 +147,13 @@ int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *d
         if (body->modal)
             memcpy(dq + body->modal->q, u + body->modal->u, (size_t)body->modal->n * sizeof(real));
     }
-    without_imposed_coordinates(model, at->memory, dq);
+    clear_imposed_coordinates(model, at->memory, dq);
     return 0;
 }
 
 /* dq of a hinge whose rates go by its coordinates, with laws alone: what it changes the rates by is
  * taken from itself once. */
-static int once_around(mstmm_state *state, const mstmm_tangent *at, const mstmm_body *body, int i)
+static int iterate_coordinates(mstmm_state *state, const mstmm_tangent *at, const mstmm_body *body, int i)
 {
     real *d_q = mstmm_aimed(state->slope->q) + body->q, *dq = state->tangents->change + body->q;
     int code = 0;
@@ -168,10 +168,10 @@ static int once_around(mstmm_state *state, const mstmm_tangent *at, const mstmm_
 int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho, real *dq)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq, .kappa = at->kappa,
                            .rho = rho ? rho : parts.still, .change = dq};
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
     memset(parts.d_q, 0, (size_t)model->nq * sizeof(real));
@@ -182,7 +182,7 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
             for (int j = 0; j < body->nu; j++)
                 dq[body->q + j] = (du[body->u + j] + step.rho[body->q + j]) / at->sq;
         } else {
-            const int code = at->laws_alone ? once_around(&state, at, body, i)
+            const int code = at->laws_alone ? iterate_coordinates(&state, at, body, i)
                                             : mstmm_at_lagged(&state, i);
             if (code) return code;
         }
@@ -192,6 +192,6 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
             dq[place] = (du[body->modal->u + j] + step.rho[place]) / at->sq;
         }
     }
-    without_imposed_coordinates(model, at->memory, dq);
+    clear_imposed_coordinates(model, at->memory, dq);
     return 0;
 }

@@ -6,14 +6,14 @@
 #include "step.h"
 
 /* 1 / (atol + rtol size) of four components, 0 where that would not be a number */
-MSTMM_INLINE void scales(const mstmm_work *work, int64_t i, const wide *size, wide *scale) {
+MSTMM_INLINE void component_scales(const mstmm_work *work, int64_t i, const wide *size, wide *scale) {
   const wide unit = *(const wide *)(work->atol + i) + work->run->rtol * *size, none = {0.0};
   const wide inverse = 1.0 / unit;
   const wide_mask sound = unit > 0.0;
   mstmm_choose(&sound, &inverse, &none, scale);
 }
 
-MSTMM_INLINE void larger(const wide *a, const wide *b, wide *out) {
+MSTMM_INLINE void larger_components(const wide *a, const wide *b, wide *out) {
   const wide_mask first = *a > *b;
   mstmm_choose(&first, a, b, out);
 }
@@ -55,8 +55,8 @@ MSTMM_WIDE double mstmm_error_norm(const mstmm_work *work, double *absolute) {
     mstmm_keep(n - i, &b);
     mstmm_size(work->y + i, &old);
     mstmm_size(work->y_new + i, &new);
-    larger(&old, &new, &size);
-    scales(work, i, &size, &scale);
+    larger_components(&old, &new, &size);
+    component_scales(work, i, &size, &scale);
     high += a * a;
     low += b * b;
     high_scaled += (a * scale) * (a * scale);

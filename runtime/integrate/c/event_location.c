@@ -29,7 +29,7 @@ int mstmm_event_values(const mstmm_work *work, double t, const double *y, double
 
 /* Side of a switch at the start of a step.  A switch that is zero is watched once it has left
  * zero. */
-static void take_sides(const mstmm_work *work, double *g) {
+static void set_sides(const mstmm_work *work, double *g) {
   for (int i = work->system->n_events; i < mstmm_n_watched(work->system); i++) {
     if (g[i] > 0.0) {
       work->side[i] = -work->side[i];
@@ -40,25 +40,25 @@ static void take_sides(const mstmm_work *work, double *g) {
 }
 
 /* The events at a time inside the trial step */
-static int values(const mstmm_work *work, double t, double *g) {
+static int evaluate_events(const mstmm_work *work, double t, double *g) {
   mstmm_dense(work, t, work->y_stage);
   return mstmm_event_values(work, t, work->y_stage, g);
 }
 
 /* The same, and the quantities that the conditions read there, to row `place` of the records. */
 enum { LEFT, RIGHT, MIDDLE };
-static double *seen_at(const mstmm_work *work, int place) {
+static double *seen_row(const mstmm_work *work, int place) {
   return work->seen + place * work->seen_row;
 }
 static int look_at(const mstmm_work *work, double t, double *g, int place) {
-  const int status = values(work, t, g);
+  const int status = evaluate_events(work, t, g);
   if (status || !work->system->n_seen) return status;
   mstmm_dense_rates(work, t, work->rates);
-  work->system->see(work->system->context, t, work->y_stage, work->rates, seen_at(work, place));
+  work->system->see(work->system->context, t, work->y_stage, work->rates, seen_row(work, place));
   return 0;
 }
 static void move_seen(const mstmm_work *work, int from, int to) {
-  memcpy(seen_at(work, to), seen_at(work, from), (size_t)work->seen_row * sizeof(double));
+  memcpy(seen_row(work, to), seen_row(work, from), (size_t)work->seen_row * sizeof(double));
 }
 
 /* Distance of neighbouring numbers around the step: what "located to rounding" means */
@@ -69,7 +69,7 @@ static double resolution(const mstmm_run *run) {
 
 /* An event is true where g >= 0; a switch is on its other side where g > 0, so that the branch that
  * begins with a strict inequality has begun. */
-static int reached(const mstmm_work *work, int i, double g) {
+static int is_reached(const mstmm_work *work, int i, double g) {
   return g > 0.0 || (g == 0.0 && i < work->system->n_events);
 }
 
@@ -92,10 +92,10 @@ static int locate(const mstmm_work *work, int i, double left, double g_left, dou
     }
     t = fmin(fmax(t, left + inset), right - inset);
     if (!(t > left && t < right)) break;
-    const int status = values(work, t, work->g_trial);
+    const int status = evaluate_events(work, t, work->g_trial);
     if (status) return status;
     const double g = work->g_trial[i];
-    if (reached(work, i, g)) {
+    if (is_reached(work, i, g)) {
       right = t;
       g_right = g;
       if (side == 1) g_left *= 0.5;
@@ -125,10 +125,10 @@ static int search_maximum(const mstmm_work *work, int i, const double *at, const
     if (!(curvature < 0.0) || !(x > t[0] && x < t[2]) || x == t[1] ||
         !(peak + 0.5 * (peak - low) >= 0.0))
       return 0;
-    const int status = values(work, x, work->g_trial);
+    const int status = evaluate_events(work, x, work->g_trial);
     if (status) return status;
     const double value = work->g_trial[i];
-    if (reached(work, i, value))
+    if (is_reached(work, i, value))
       return locate(work, i, x < t[1] ? t[0] : t[1], x < t[1] ? v[0] : v[1], x, value, root);
     const int upper = value > v[1] ? x > t[1] : x < t[1]; /* which neighbour to replace */
     const int middle = value > v[1];
@@ -157,7 +157,7 @@ typedef struct border {
 enum { NOTHING_THERE, ONE_CROSSING, OPEN };
 
 /* Whether the part between two ends with the bounds `bounded`, the left one false, is clear */
-static int judge(const mstmm_work *work, int i, const mstmm_bounds *bounded, const border *left,
+static int is_part_clear(const mstmm_work *work, int i, const mstmm_bounds *bounded, const border *left,
                  const border *right, double *highest) {
   const double h = right->t - left->t;
   const int turned = i >= work->system->n_events && work->side[i] < 0.0;
@@ -168,7 +168,7 @@ static int judge(const mstmm_work *work, int i, const mstmm_bounds *bounded, con
     const double at = (right->g - left->g - s0 * h) / (s1 - s0);
     *highest = fmin(*highest, left->g + s1 * fmin(fmax(at, 0.0), h));
   }
-  if (reached(work, i, right->g)) return s0 >= 0.0 ? ONE_CROSSING : OPEN;
+  if (is_reached(work, i, right->g)) return s0 >= 0.0 ? ONE_CROSSING : OPEN;
   return *highest < 0.0 || s0 >= 0.0 || s1 <= 0.0 ? NOTHING_THERE : OPEN;
 }
 
@@ -185,7 +185,7 @@ static void note_unseen(mstmm_run *run, int i, double t) {
 /* Halves undecided parts between left and right, and locates the first time at which event or
  * switch i is true; *root is unchanged if there is none.  Rows LEFT and RIGHT of the records are
  * those of the two ends. */
-static int search(const mstmm_work *work, int i, border left, border right, double *root) {
+static int search_root(const mstmm_work *work, int i, border left, border right, double *root) {
   const mstmm_system *system = work->system;
   const double fine = fmax(4.0 * resolution(work->run), FINEST * (right.t - left.t));
   border ends[MSTMM_DEPTH + 1] = {right};
@@ -198,14 +198,14 @@ static int search(const mstmm_work *work, int i, border left, border right, doub
   for (int taken = 0; top >= 0;) {
     const border *to = &ends[top];
     const double width = to->t - left.t;
-    system->enclose(system->context, width, seen_at(work, at), seen_at(work, MIDDLE + 1 + top),
+    system->enclose(system->context, width, seen_row(work, at), seen_row(work, MIDDLE + 1 + top),
                     work->bounds);
     kept = work->bounds[i];
     if (first_width == INFINITY) first_width = kept.hi - kept.lo;
-    const int found = judge(work, i, &kept, &left, to, &highest);
+    const int found = is_part_clear(work, i, &kept, &left, to, &highest);
     const int closed = width <= fine || top == MSTMM_DEPTH - 1;
     const int enough = found == OPEN && !closed && taken >= most;
-    const int crosses = reached(work, i, to->g);
+    const int crosses = is_reached(work, i, to->g);
     if (crosses && (found == ONE_CROSSING || closed || enough)) {
       if (enough) note_unseen(work->run, i, left.t);
       return locate(work, i, left.t, left.g, to->t, to->g, root);
@@ -230,12 +230,12 @@ static int search(const mstmm_work *work, int i, border left, border right, doub
 
 /* Numbers `first` to `last` of what is watched, between `left` (values g_left, and g_before at
  * `before`) and `right` (values g_right): sets the earliest. */
-static int first_among(const mstmm_work *work, int first, int last, const double *at) {
+static int find_first_event(const mstmm_work *work, int first, int last, const double *at) {
   mstmm_run *run = work->run;
   mstmm_bounds *bounds = work->first_bounds;
   if (work->system->n_seen && last > first)
-    work->system->enclose(work->system->context, at[2] - at[1], seen_at(work, LEFT),
-                          seen_at(work, RIGHT), bounds);
+    work->system->enclose(work->system->context, at[2] - at[1], seen_row(work, LEFT),
+                          seen_row(work, RIGHT), bounds);
   for (int i = first; i < last; i++) {
     const double g[3] = {work->g_before[i], work->g_left[i], work->g_right[i]};
     double root = INFINITY;
@@ -244,12 +244,12 @@ static int first_among(const mstmm_work *work, int first, int last, const double
     if (work->system->n_seen) {
       double highest;
       const border left = {at[1], g[1]}, right = {at[2], g[2]};
-      const int found = judge(work, i, &bounds[i], &left, &right, &highest);
+      const int found = is_part_clear(work, i, &bounds[i], &left, &right, &highest);
       if (found == ONE_CROSSING)
         status = locate(work, i, at[1], g[1], at[2], g[2], &root);
       else if (found == OPEN)
-        status = search(work, i, left, right, &root);
-    } else if (reached(work, i, g[2]))
+        status = search_root(work, i, left, right, &root);
+    } else if (is_reached(work, i, g[2]))
       status = locate(work, i, at[1], g[1], at[2], g[2], &root);
     else if (at[0] < at[1] && g[0] < 0.0 && g[1] < 0.0)
       status = search_maximum(work, i, at, g, &root);
@@ -263,7 +263,7 @@ static int first_among(const mstmm_work *work, int first, int last, const double
 }
 
 /* At t_scan itself: an event that another one, fired here without effect, had hidden. */
-static int pending(const mstmm_work *work) {
+static int find_pending(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int status = look_at(work, run->real.t_scan, work->g_left, LEFT);
   for (int i = 0; i < work->system->n_events && !status; i++)
@@ -290,7 +290,7 @@ static void learn_switches(const mstmm_work *work, const double *g) {
 }
 
 /* Evaluates at the times after `left` up to `end` until one of the events is found. */
-static int look(const mstmm_work *work, int first, int last, double left, double end,
+static int scan_times(const mstmm_work *work, int first, int last, double left, double end,
                 void (*learn)(const mstmm_work *, const double *)) {
   mstmm_run *run = work->run;
   const size_t bytes = (size_t)mstmm_n_watched(work->system) * sizeof(double);
@@ -303,7 +303,7 @@ static int look(const mstmm_work *work, int first, int last, double left, double
     const double right = fmin(place, end), at[3] = {before, left, right};
     if (right <= left) continue;
     status = look_at(work, right, work->g_right, RIGHT);
-    if (!status) status = first_among(work, first, last, at);
+    if (!status) status = find_first_event(work, first, last, at);
     if (status || run->count.event >= 0) break;
     learn(work, work->g_right);
     memcpy(work->g_before, work->g_left, bytes);
@@ -322,8 +322,8 @@ static int find_switch(const mstmm_work *work) {
   const int n = work->system->n_events;
   int status = look_at(work, run->real.t, work->g_left, LEFT);
   if (!status) {
-    take_sides(work, work->g_left);
-    status = look(work, n, mstmm_n_watched(work->system), run->real.t, run->real.t_new,
+    set_sides(work, work->g_left);
+    status = scan_times(work, n, mstmm_n_watched(work->system), run->real.t, run->real.t_new,
                   learn_switches);
   }
   if (status) return status; /* of the event that failed */
@@ -345,7 +345,7 @@ int mstmm_find_switch(const mstmm_work *work) {
 }
 
 /* A bounce needs an approach: a motion that was at the event when the step began has none. */
-static int nothing_let_through(const mstmm_work *work) {
+static int check_let_through(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const mstmm_system *system = work->system;
   const double t = run->real.t_stop;
@@ -365,11 +365,11 @@ int mstmm_scan(const mstmm_work *work) {
   run->real.t_stop = fmin(run->real.t_new, run->real.t_switch);
   run->count.event = -1;
   if (work->system->n_events) {
-    status = pending(work);
+    status = find_pending(work);
     if (!status && run->count.event < 0)
-      status = look(work, 0, work->system->n_events, run->real.t_scan, run->real.t_stop,
+      status = scan_times(work, 0, work->system->n_events, run->real.t_scan, run->real.t_stop,
                     learn_events);
-    if (!status && run->count.event < 0) status = nothing_let_through(work);
+    if (!status && run->count.event < 0) status = check_let_through(work);
   }
   if (!status && run->count.event < 0 && run->real.t_switch <= run->real.t_new)
     run->count.event = run->count.next_switch;

@@ -90,7 +90,7 @@ typedef struct parts {
   double *f, *way, *rest, *scratch; /* rates at the start, Y - y_0, D, and intermediate results */
 } parts;
 
-static parts parts_of(const mstmm_work *work) {
+static parts motion_parts(const mstmm_work *work) {
   const int n = unknowns(work);
   double *first = work->motion;
   return (parts){.f = first, .way = first + n, .rest = first + 2 * n, .scratch = first + 3 * n};
@@ -105,20 +105,20 @@ static int free_rates(const mstmm_work *work, double t, const double *row, const
   return mstmm_step_rates(work, t, row, row + n_q, to);
 }
 
-static void force(const mstmm_work *work, int k, double weight, const double *vector) {
-  double *c = parts_of(work).scratch;
+static void set_force(const mstmm_work *work, int k, double weight, const double *vector) {
+  double *c = motion_parts(work).scratch;
   for (int i = 0; i < unknowns(work); i++) c[i] = weight * vector[i];
   mstmm_phi_force(&work->phi, k, c);
 }
 
-static int go_linearly(const mstmm_work *work, const parts *at) {
+static int integrate_linear_part(const mstmm_work *work, const parts *at) {
   const double h = work->run->real.h, t = mstmm_time_in(work->run, 0.0);
   const int n = unknowns(work), status = free_rates(work, t, work->y, work->k, at->f);
   if (status) return status;
   if (mstmm_phi_prepare(&work->phi, h, work->jacobian))
     return mstmm_note(work->run, MSTMM_TANGENT_FAILED, 0, -1, t);
-  force(work, 0, h, at->f);
-  force(work, 1, h * h, work->time_slope);
+  set_force(work, 0, h, at->f);
+  set_force(work, 1, h * h, work->time_slope);
   mstmm_phi_part(&work->phi, 0, at->way);
   mstmm_phi_part(&work->phi, 1, at->scratch);
   for (int i = 0; i < n; i++) at->way[i] += at->scratch[i];
@@ -128,7 +128,7 @@ static int go_linearly(const mstmm_work *work, const parts *at) {
 }
 
 /* D, and its contribution to the motion */
-static int see_the_rest(const mstmm_work *work, const parts *at) {
+static int integrate_remainder(const mstmm_work *work, const parts *at) {
   const double h = work->run->real.h, t = mstmm_time_in(work->run, 1.0);
   const int n = unknowns(work);
   double *slope = work->k + work->row;
@@ -141,13 +141,13 @@ static int see_the_rest(const mstmm_work *work, const parts *at) {
     for (int j = 0; j < n; j++) linear += work->jacobian[i * n + j] * at->way[j];
     at->rest[i] -= linear;
   }
-  force(work, 2, 2.0 * h, at->rest);
+  set_force(work, 2, 2.0 * h, at->rest);
   mstmm_phi_part(&work->phi, 2, at->rest);
   return 0;
 }
 
 /* y_new, its slope, the step as a whole and its error */
-static int arrive(const mstmm_work *work, const parts *at) {
+static int finish_exponential_step(const mstmm_work *work, const parts *at) {
   const double h = work->run->real.h, t = mstmm_time_in(work->run, 1.0);
   double *whole = work->k + work->row, *error = whole + work->row, *last = error + work->row;
   const int n = unknowns(work);
@@ -167,15 +167,15 @@ static int arrive(const mstmm_work *work, const parts *at) {
 }
 
 int mstmm_exponential_stages(const mstmm_work *work) {
-  const parts at = parts_of(work);
+  const parts at = motion_parts(work);
   int status = linearise(work);
-  if (!status) status = go_linearly(work, &at);
-  if (!status) status = see_the_rest(work, &at);
-  return status ? status : arrive(work, &at);
+  if (!status) status = integrate_linear_part(work, &at);
+  if (!status) status = integrate_remainder(work, &at);
+  return status ? status : finish_exponential_step(work, &at);
 }
 
 void mstmm_exponential_dense(const mstmm_work *work, double theta, double *y) {
-  double *way = parts_of(work).scratch;
+  double *way = motion_parts(work).scratch;
   mstmm_phi_at(&work->phi, theta, way);
   for (int i = 0; i < unknowns(work); i++) y[i] = work->y[i] + way[i];
 }

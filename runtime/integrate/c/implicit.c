@@ -126,19 +126,19 @@ MSTMM_INLINE double rms(const mstmm_work *work, const double *other, int64_t fir
 }
 
 /* The largest of three, or NaN where one is */
-static double largest(double a, double b, double c) {
+static double largest_of_three(double a, double b, double c) {
   const double found = a > b ? a : b;
   return a + b + c != a + b + c ? NAN : found > c ? found : c;
 }
 
 /* Norm of work->error */
-static double norm(const mstmm_work *work, const double *other) {
+static double weighted_norm(const mstmm_work *work, const double *other) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
-  return largest(rms(work, other, 0, n_q, 0), rms(work, other, n_q, n_q + n_u, 1),
+  return largest_of_three(rms(work, other, 0, n_q, 0), rms(work, other, n_q, n_q + n_u, 1),
                  rms(work, other, n_q + n_u, work->system->n_state, 0));
 }
 
-MSTMM_WIDE static void estimate(const mstmm_work *work) {
+MSTMM_WIDE static void estimate_error(const mstmm_work *work) {
   const mstmm_terms terms = mstmm_error_terms(work->tableau, 0);
   for (int64_t i = 0; i < work->row; i += WIDE) {
     wide sum;
@@ -151,13 +151,13 @@ double mstmm_implicit_norm(const mstmm_work *work, double *absolute) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const int n = work->system->n_error < n_q + n_u ? work->system->n_error : n_q + n_u;
   double sum = 0.0; /* of the motion alone: quadratures have units of their own */
-  estimate(work);
+  estimate_error(work);
   for (int i = 0; i < n; i++) {
     const double e = work->error[i] * (is_speed(work, i) ? work->run->real.h : 1.0);
     sum += e * e;
   }
   *absolute = n ? sqrt(sum / n) : 0.0;
-  return norm(work, work->y_new);
+  return weighted_norm(work, work->y_new);
 }
 
 double mstmm_increment_norm(const mstmm_work *work) {
@@ -165,7 +165,7 @@ double mstmm_increment_norm(const mstmm_work *work) {
   memcpy(work->error, work->dq, (size_t)n_q * sizeof(double));
   memcpy(work->error + n_q, work->du, (size_t)n_u * sizeof(double));
   for (int64_t i = n_q + n_u; i < work->row; i++) work->error[i] = 0.0;
-  return norm(work, work->y_stage);
+  return weighted_norm(work, work->y_stage);
 }
 
 /* Which of the first n components of work->error is the largest in units of its tolerance */
@@ -184,7 +184,7 @@ static int64_t worst_of(const mstmm_work *work, const double *other, int64_t n) 
 }
 
 int64_t mstmm_implicit_worst(const mstmm_work *work) {
-  estimate(work);
+  estimate_error(work);
   return worst_of(work, work->y_new, work->system->n_error);
 }
 

@@ -25,7 +25,7 @@ static void put_sample(mstmm_run *run, double t, const double *y, int64_t event)
   if (nm) memcpy(run->sample_memory + i * nm, system->memory, (size_t)nm * sizeof *y);
 }
 
-static int room(const mstmm_run *run, int64_t wanted) {
+static int has_room(const mstmm_run *run, int64_t wanted) {
   return run->sample_capacity - run->n_samples >= wanted;
 }
 
@@ -80,7 +80,7 @@ static int fire(const mstmm_work *work, int i, double t, int sampled) {
 }
 
 /* Bookkeeping after event i has changed the current state; the next step starts here. */
-static int after_change(const mstmm_work *work, int i) {
+static int note_change(const mstmm_work *work, int i) {
   mstmm_run *run = work->run;
   const double t = run->real.t, since = t - work->last_fire[i];
   const int same_time = fabs(since) <= 8.0 * (nextafter(fabs(t), INFINITY) - fabs(t));
@@ -101,7 +101,7 @@ static int stop_run(mstmm_run *run) {
   return MSTMM_STOPPED;
 }
 
-static void learn_here(const mstmm_work *work, const double *g) {
+static void update_truth(const mstmm_work *work, const double *g) {
   for (int i = 0; i < work->system->n_events; i++)
     if (work->truth[i] == HOLDS && g[i] < 0.0)
       work->truth[i] = work->last_fire[i] == work->run->real.t ? DOUBTFUL : UNTRUE;
@@ -110,13 +110,13 @@ static void learn_here(const mstmm_work *work, const double *g) {
 static int fire_here(const mstmm_work *work, int i) {
   mstmm_run *run = work->run;
   const size_t bytes = (size_t)work->system->n_state * sizeof(double);
-  if (!room(run, 2)) return MSTMM_BUFFER_FULL;
+  if (!has_room(run, 2)) return MSTMM_BUFFER_FULL;
   memcpy(work->y_event, work->y, bytes);
   save_memory(work);
   const int answer = fire(work, i, run->real.t, (int)run->count.sampled);
   if (answer == MSTMM_FIRE_RESTART || answer == MSTMM_FIRE_STOP) {
     memcpy(work->y, work->y_event, bytes);
-    const int status = after_change(work, i);
+    const int status = note_change(work, i);
     return answer == MSTMM_FIRE_STOP ? stop_run(run) : status;
   }
   restore_memory(work);
@@ -130,7 +130,7 @@ static int phase_here(const mstmm_work *work) {
   if (system->n_events) {
     const int status = mstmm_event_values(work, run->real.t, work->y, g);
     if (status) return status;
-    learn_here(work, g);
+    update_truth(work, g);
   }
   for (int i = 0; i < system->n_events; i++)
     if (g[i] >= 0.0 && (work->truth[i] == UNTRUE || work->truth[i] == DOUBTFUL))
@@ -147,7 +147,7 @@ static int sample_current(const mstmm_work *work) {
   int64_t *i = &run->count.output_index;
   const int due = *i < run->n_outputs && run->outputs[*i] <= run->real.t;
   if ((run->n_outputs < 0 || due) && !run->count.sampled) {
-    if (!room(run, 1)) return MSTMM_BUFFER_FULL;
+    if (!has_room(run, 1)) return MSTMM_BUFFER_FULL;
     put_sample(run, run->real.t, work->y, 0);
     run->n_samples++;
     run->count.sampled = 1;
@@ -174,7 +174,7 @@ static int phase_sample(const mstmm_work *work) {
 
 /* ---- inside the accepted trial step ---- */
 
-static int hardly_any_time(const mstmm_run *run, double t) {
+static int is_negligible_time(const mstmm_run *run, double t) {
   return t <= AT_ONCE * fmax(fabs(run->real.t), run->t_end - run->t_start);
 }
 
@@ -187,7 +187,7 @@ static int phase_switch(const mstmm_work *work) {
   const int status = mstmm_find_switch(work);
   const double way = run->real.t_switch - run->real.t;
   run->count.phase = PHASE_SCAN;
-  if (status || !(way > 0.0 && way < INFINITY) || hardly_any_time(run, way)) return status;
+  if (status || !(way > 0.0 && way < INFINITY) || is_negligible_time(run, way)) return status;
   run->real.h_cut = (run->real.h_cut > 0.0 ? WELL_BEFORE : JUST_BEFORE) * way;
   run->count.steps--;
   run->count.rejected++;
@@ -207,7 +207,7 @@ static int phase_output(const mstmm_work *work) {
   const int event = run->count.event >= 0; /* then the state at t_stop is dense output too */
   while (*i < run->n_outputs && (run->outputs[*i] < run->real.t_stop ||
                                  (event && run->outputs[*i] == run->real.t_stop))) {
-    if (!room(run, 1)) return MSTMM_BUFFER_FULL;
+    if (!has_room(run, 1)) return MSTMM_BUFFER_FULL;
     mstmm_dense(work, run->outputs[*i], work->y_event);
     put_sample(run, run->outputs[*i], work->y_event, 0);
     run->n_samples++;
@@ -221,7 +221,7 @@ static int phase_output(const mstmm_work *work) {
 
 /* Calls accept on y at time t.  Returns 1 if the saved first stage is to be forgotten, 0 if not,
  * or a failure status after which the memory is as it was. */
-static int accept(const mstmm_work *work, double t, double *y) {
+static int accept_state(const mstmm_work *work, double t, double *y) {
   const mstmm_system *system = work->system;
   const int64_t n = system->n_state;
   save_memory(work);
@@ -252,16 +252,16 @@ static int phase_fire(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int i = (int)run->count.event;
   const double t = run->real.t_stop;
-  if (!room(run, 2)) return MSTMM_BUFFER_FULL;
+  if (!has_room(run, 2)) return MSTMM_BUFFER_FULL;
   mstmm_dense(work, t, work->y_event);
-  int status = accept(work, t, work->y_event);
+  int status = accept_state(work, t, work->y_event);
   if (status < 0) return status;
   const int answer = fire(work, i, t, 0);
   if (answer < 0) return answer;
   if (answer == MSTMM_FIRE_RESTART || answer == MSTMM_FIRE_STOP) {
     move_to(work, t, work->y_event);
     run->count.phase = PHASE_HERE;
-    status = after_change(work, i);
+    status = note_change(work, i);
     return answer == MSTMM_FIRE_STOP ? stop_run(run) : status;
   }
   restore_memory(work);
@@ -277,7 +277,7 @@ static void note_crossing(const mstmm_work *work, int i) {
   const double t = run->real.t, since = t - work->last_fire[i];
   work->last_fire[i] = t;
   run->count.crossings++;
-  run->count.crossings_here = hardly_any_time(run, since) ? run->count.crossings_here + 1 : 0;
+  run->count.crossings_here = is_negligible_time(run, since) ? run->count.crossings_here + 1 : 0;
   if (run->count.crossings_here < MOST_CROSSINGS_HERE) return;
   run->count.crossings_here = 0;
   run->count.chatter = i - run->system->n_events;
@@ -289,7 +289,7 @@ static int phase_cross(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int i = (int)run->count.event;
   mstmm_dense(work, run->real.t_stop, work->y_event);
-  const int status = accept(work, run->real.t_stop, work->y_event);
+  const int status = accept_state(work, run->real.t_stop, work->y_event);
   if (status < 0) return status;
   move_to(work, run->real.t_stop, work->y_event);
   run->count.event = -1;
@@ -311,7 +311,7 @@ static void note_length(mstmm_run *run) {
 static int phase_accept(const mstmm_work *work) {
   mstmm_run *run = work->run;
   const int64_t row = work->row;
-  const int status = accept(work, run->real.t_new, work->y_new);
+  const int status = accept_state(work, run->real.t_new, work->y_new);
   if (status < 0) return status;
   move_to(work, run->real.t_new, work->y_new);
   note_length(run);
@@ -340,7 +340,7 @@ static int make_phase(const mstmm_work *work) {
   }
 }
 
-static double seconds(void) {
+double mstmm_seconds(void) {
   struct timespec now;
   clock_gettime(CLOCK_MONOTONIC, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
@@ -354,7 +354,7 @@ typedef struct pace {
 
 static int time_is_up(pace *at) {
   if (!isfinite(at->deadline) || --at->left > 0) return 0;
-  const double now = seconds();
+  const double now = mstmm_seconds();
   at->stride = now - at->last > 1e-4 ? 1 : at->stride < 64 ? 2 * at->stride : 64;
   at->left = at->stride;
   at->last = now;
@@ -368,7 +368,7 @@ int mstmm_advance(mstmm_run *run, double wall_seconds) {
   run->count.tangent_held = 0; /* the caller may have used the system since */
   run->count.asked = 0;
   const int64_t steps = run->count.steps;
-  const double now = seconds();
+  const double now = mstmm_seconds();
   pace at = {.deadline = now + wall_seconds, .last = now, .stride = 1, .left = 1};
   for (;;) {
     const int64_t phase = run->count.phase;

@@ -30,7 +30,7 @@ int mstmm_is_asked(mstmm_run *run) {
 }
 
 /* Between two steps, or after an impossible step: then as at a start. */
-static int goes_on(mstmm_run *run) {
+static int can_continue(mstmm_run *run) {
   if (run->count.phase <= PHASE_STEP) return 1;
   if (!run->count.no_step) return 0;
   run->count.no_step = 0;
@@ -61,7 +61,7 @@ int mstmm_run_change(mstmm_run *run, const mstmm_tableau *tableau, double *works
   const size_t watched = (size_t)mstmm_n_watched(run->system) * sizeof(double);
   mstmm_run changed = *run;
   mstmm_work from, to;
-  if (!size || run->fixed_step > 0.0 || !tableau->n_errors || !goes_on(&changed))
+  if (!size || run->fixed_step > 0.0 || !tableau->n_errors || !can_continue(&changed))
     return MSTMM_BAD_ARGUMENT;
   memset(workspace, 0, (size_t)size * sizeof(double));
   changed.tableau = tableau;

@@ -12,7 +12,7 @@
 
 /* work->flow := q after time 1 along q' = N(q) theta from `from`, by the classical
  * Runge-Kutta method: exact but for rotations, and there beyond what the family resolves. */
-static int flow(const mstmm_work *work, double t, const double *from, const double *theta,
+static int flow_coordinates(const mstmm_work *work, double t, const double *from, const double *theta,
                 double *to) {
   static const double nodes[] = {0.0, 0.5, 0.5, 1.0}, weights[] = {1.0, 2.0, 2.0, 1.0};
   const int n = work->implicit->n_q;
@@ -33,21 +33,21 @@ static int flow(const mstmm_work *work, double t, const double *from, const doub
 }
 
 /* y_stage from the acceleration in it */
-static int place(const mstmm_work *work, const mstmm_newton_equations *stage) {
+static int newmark_place(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   double *y = work->y_stage, *a = mstmm_row_a(work, y), *theta = work->rho_u;
   for (int i = 0; i < n_u; i++) {
     theta[i] = work->map_q[i] + stage->cq * a[i];
     y[n_q + i] = work->map_u[i] + stage->cu * a[i];
   }
-  const int status = flow(work, stage->t, work->y, theta, y);
+  const int status = flow_coordinates(work, stage->t, work->y, theta, y);
   return status ? status : mstmm_step_impose(work, stage->t, y);
 }
 
-static int move(const mstmm_work *work, const mstmm_newton_equations *stage) {
+static int newmark_move(const mstmm_work *work, const mstmm_newton_equations *stage) {
   double *a = mstmm_row_a(work, work->y_stage);
   for (int i = 0; i < work->implicit->n_u; i++) a[i] += work->da[i];
-  return place(work, stage);
+  return newmark_place(work, stage);
 }
 
 /* ---- formulas in terms of the acceleration at the stage ---- */
@@ -68,20 +68,20 @@ typedef struct constants {
 } constants;
 
 /* Delay of auxiliary accelerations in a smooth motion, in steps. */
-static double lag(const mstmm_tableau *t) { return t->alpha_f - t->alpha_m; }
+static double auxiliary_delay(const mstmm_tableau *t) { return t->alpha_f - t->alpha_m; }
 
 /* A step with rows of accelerations from a start at which only the motion is known assumes a
  * smooth motion: its auxiliary accelerations at start and end have the same delay, which needs
  * none of them and keeps the order. */
-static int starts_smoothly(const mstmm_work *work) {
+static int has_smooth_start(const mstmm_work *work) {
   return work->implicit->placing && !mstmm_step_places(work) && work->run->real.h_previous == 0.0;
 }
 
 static constants constants_of(const mstmm_work *work) {
   const mstmm_tableau *t = work->tableau;
-  if (starts_smoothly(work))
+  if (has_smooth_start(work))
     return (constants){
-        .beta = t->beta_n - 0.5 * lag(t), .gamma = t->gamma_n - lag(t), .part = 1.0};
+        .beta = t->beta_n - 0.5 * auxiliary_delay(t), .gamma = t->gamma_n - auxiliary_delay(t), .part = 1.0};
   return (constants){.alpha_m = t->alpha_m, .alpha_f = t->alpha_f, .beta = t->beta_n,
                      .gamma = t->gamma_n, .part = (1.0 - t->alpha_f) / (1.0 - t->alpha_m)};
 }
@@ -127,7 +127,7 @@ static int has_history(const mstmm_work *work) {
 }
 
 /* Linear acceleration up to the collocation point: back to the step's end */
-static int come_back(const mstmm_work *work, mstmm_newton_equations *stage) {
+static int return_from_collocation(const mstmm_work *work, mstmm_newton_equations *stage) {
   const mstmm_tableau *tableau = work->tableau;
   const int n_q = work->implicit->n_q;
   double *a = mstmm_row_a(work, work->y_stage);
@@ -135,20 +135,20 @@ static int come_back(const mstmm_work *work, mstmm_newton_equations *stage) {
     a[i] = work->k[n_q + i] + (a[i] - work->k[n_q + i]) / tableau->collocation;
   stage->t = mstmm_time_in(work->run, 1.0);
   map_alpha(work, stage, work->run->real.h);
-  return place(work, stage);
+  return newmark_place(work, stage);
 }
 
 /* Data for the next step, after the state in y_new. */
-static void remember(const mstmm_work *work, const mstmm_newton_equations *stage) {
+static void store_history(const mstmm_work *work, const mstmm_newton_equations *stage) {
   const mstmm_tableau *t = work->tableau;
-  const int n_u = work->implicit->n_u, smooth = starts_smoothly(work);
+  const int n_u = work->implicit->n_u, smooth = has_smooth_start(work);
   const constants by = constants_of(work);
   const double *a = mstmm_row_a(work, work->y_new), *first = work->k + work->implicit->n_q;
   double *behind = mstmm_row_behind(work, work->y_new);
   if (t->backward) memcpy(behind + n_u, mstmm_row_behind(work, work->y), (size_t)n_u * sizeof *a);
   for (int i = 0; i < n_u; i++)
     behind[i] = t->backward ? work->map_q[i] + stage->cq * a[i]
-                : smooth    ? a[i] - lag(t) * (a[i] - first[i])
+                : smooth    ? a[i] - auxiliary_delay(t) * (a[i] - first[i])
                             : known_part(work, &by, i) + by.part * a[i];
 }
 
@@ -192,7 +192,7 @@ int mstmm_alpha_stages(const mstmm_work *work) {
   const int n_q = work->implicit->n_q, n_u = work->implicit->n_u;
   const double h = work->run->real.h, collocation = tableau->collocation;
   mstmm_newton_equations stage = {
-      .t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = move};
+      .t = mstmm_time_in(work->run, collocation), .kappa = 0, .move = newmark_move};
   int status = wants_rows_obeyed(work) ? obey_rows(work) : 0;
   if (status) return status;
   if (has_history(work))
@@ -203,12 +203,12 @@ int mstmm_alpha_stages(const mstmm_work *work) {
   stage.sq = stage.cu / stage.cq;
   memcpy(work->y_stage, work->y, (size_t)work->row * sizeof(double));
   memcpy(mstmm_row_a(work, work->y_stage), work->k + n_q, (size_t)n_u * sizeof(double));
-  status = place(work, &stage);
+  status = newmark_place(work, &stage);
   if (!status) status = mstmm_newton_stage(work, &stage);
-  if (!status && collocation != 1.0) status = come_back(work, &stage);
+  if (!status && collocation != 1.0) status = return_from_collocation(work, &stage);
   if (status) return status;
   memcpy(work->y_new, work->y_stage, (size_t)work->row * sizeof(double));
-  remember(work, &stage);
+  store_history(work, &stage);
   status = fill_rows(work, stage.t);
   return status ? status : mstmm_check_new(work);
 }

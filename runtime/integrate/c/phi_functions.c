@@ -27,16 +27,16 @@ static const double SMALL = 0.8; /* of a norm: then the rest of the polynomial i
 
 /* ---- storage ---- */
 
-static int row_of(int n) { return (n + WIDE - 1) / WIDE * WIDE; }
+static int padded_length(int n) { return (n + WIDE - 1) / WIDE * WIDE; }
 
 int64_t mstmm_phi_size(int n) {
-  const int64_t row = row_of(n), square = n * row;
+  const int64_t row = padded_length(n), square = n * row;
   return WIDE + row + square + MOST_LEVELS * square + (MOST_LEVELS + 1) * PRODUCTS * row + 3 * row +
          5 * square;
 }
 
 mstmm_phi mstmm_phi_lay(int n, double *numbers) {
-  const int64_t row = row_of(n), square = n * row;
+  const int64_t row = padded_length(n), square = n * row;
   mstmm_phi phi = {.n = n, .row = (int)row, .levels = numbers};
   if (!numbers) return phi;
   phi.scale = numbers + WIDE;
@@ -55,13 +55,13 @@ static double *power_of(const mstmm_phi *phi, int level) {
 }
 
 /* Row `product` of a level: a_1 c_0; a_1 c_1, a_2 c_1; a_1 c_2, a_2 c_2, a_3 c_2 */
-static double *moved_of(const mstmm_phi *phi, int level, int product) {
+static double *moved_row(const mstmm_phi *phi, int level, int product) {
   return phi->moved + ((int64_t)level * PRODUCTS + product) * phi->row;
 }
 
 /* ---- products; rows are whole vectors, zeros behind n ---- */
 
-MSTMM_WIDE static void multiply(const mstmm_phi *phi, const double *a, const double *b,
+MSTMM_WIDE static void multiply_matrices(const mstmm_phi *phi, const double *a, const double *b,
                                 double *out) {
   const int n = phi->n, row = phi->row;
   memset(out, 0, (size_t)square_of(phi) * sizeof(double));
@@ -73,7 +73,7 @@ MSTMM_WIDE static void multiply(const mstmm_phi *phi, const double *a, const dou
     }
 }
 
-MSTMM_WIDE static void apply(const mstmm_phi *phi, const double *a, const double *x, double *out) {
+MSTMM_WIDE static void apply_matrix(const mstmm_phi *phi, const double *a, const double *x, double *out) {
   for (int i = 0; i < phi->n; i++) {
     wide sum = {0.0};
     for (int j = 0; j < phi->row; j += WIDE)
@@ -82,7 +82,7 @@ MSTMM_WIDE static void apply(const mstmm_phi *phi, const double *a, const double
   }
 }
 
-static void add(const mstmm_phi *phi, double weight, const double *x, double *sum) {
+static void add_vector(const mstmm_phi *phi, double weight, const double *x, double *sum) {
   for (int i = 0; i < phi->n; i++) sum[i] += weight * x[i];
 }
 
@@ -121,7 +121,7 @@ static void balance(const mstmm_phi *phi) {
 }
 
 /* The smaller of the largest sums along rows and along columns */
-static double norm(const mstmm_phi *phi) {
+static double matrix_norm(const mstmm_phi *phi) {
   double rows = 0.0, columns = 0.0;
   for (int i = 0; i < phi->n; i++) {
     double of_row, of_column;
@@ -144,20 +144,20 @@ static void add_part(const mstmm_phi *phi, const double *w, const double *second
 }
 
 /* exp(A) - 1, by the polynomial in A^4 whose coefficients are cubics in A */
-static void exponential(const mstmm_phi *phi, double *out) {
+static void matrix_exponential(const mstmm_phi *phi, double *out) {
   const int64_t square = square_of(phi);
   double *second = phi->scratch, *third = second + square, *fourth = third + square;
   double *sum = fourth + square, *next = sum + square, weights[DEGREE + 1] = {1.0};
   for (int i = 1; i <= DEGREE; i++) weights[i] = weights[i - 1] / i;
   weights[0] = 0.0;
-  multiply(phi, phi->matrix, phi->matrix, second);
-  multiply(phi, second, phi->matrix, third);
-  multiply(phi, second, second, fourth);
+  multiply_matrices(phi, phi->matrix, phi->matrix, second);
+  multiply_matrices(phi, second, phi->matrix, third);
+  multiply_matrices(phi, second, second, fourth);
   for (int64_t i = 0; i < square; i++) sum[i] = weights[DEGREE] * fourth[i];
   for (int k = DEGREE - 4;; k -= 4) {
     add_part(phi, weights + k, second, sum);
     if (k == 0) break;
-    multiply(phi, fourth, sum, next);
+    multiply_matrices(phi, fourth, sum, next);
     memcpy(sum, next, (size_t)square * sizeof(double));
   }
   memcpy(out, sum, (size_t)square * sizeof(double));
@@ -165,12 +165,12 @@ static void exponential(const mstmm_phi *phi, double *out) {
 
 /* From E - 1 to E^2 - 1 */
 static void square_up(const mstmm_phi *phi, const double *from, double *to) {
-  multiply(phi, from, from, to);
+  multiply_matrices(phi, from, from, to);
   for (int64_t i = 0; i < square_of(phi); i++) to[i] += 2.0 * from[i];
 }
 
 /* True if all of h J is finite and so small that sums of it are. */
-static int take(const mstmm_phi *phi, double h, const double *J) {
+static int set_matrix(const mstmm_phi *phi, double h, const double *J) {
   double size = 0.0;
   memset(phi->matrix, 0, (size_t)square_of(phi) * sizeof(double));
   for (int i = 0; i < phi->n; i++) {
@@ -184,15 +184,15 @@ static int take(const mstmm_phi *phi, double h, const double *J) {
 }
 
 int mstmm_phi_prepare(const mstmm_phi *phi, double h, const double *J) {
-  if (!take(phi, h, J)) return 1;
+  if (!set_matrix(phi, h, J)) return 1;
   balance(phi);
-  double size = norm(phi);
+  double size = matrix_norm(phi);
   int levels = 0;
   for (; size > SMALL; size *= 0.5) levels++;
   if (levels > MOST_LEVELS) return 1;
   *phi->levels = levels;
   for (int64_t i = 0; i < square_of(phi); i++) phi->matrix[i] = ldexp(phi->matrix[i], -levels);
-  if (levels) exponential(phi, phi->powers);
+  if (levels) matrix_exponential(phi, phi->powers);
   for (int j = 1; j < levels; j++) square_up(phi, power_of(phi, j - 1), power_of(phi, j));
   return 0;
 }
@@ -207,29 +207,29 @@ static void add_series(const mstmm_phi *phi, double tau, int count, double *d, d
     double weight = power;
     for (int j = 1; j <= count; j++) {
       weight *= tau / (i + j);
-      add(phi, weight, d, to[j - 1]);
+      add_vector(phi, weight, d, to[j - 1]);
     }
-    apply(phi, phi->matrix, d, next);
+    apply_matrix(phi, phi->matrix, d, next);
     memcpy(d, next, (size_t)phi->row * sizeof(double));
     power *= tau / (i + 1);
   }
 }
 
 /* out = E x */
-static void exponential_of(const mstmm_phi *phi, int level, const double *x, double *out) {
+static void apply_exponential(const mstmm_phi *phi, int level, const double *x, double *out) {
   memset(out, 0, (size_t)phi->row * sizeof(double));
-  apply(phi, power_of(phi, level), x, out);
-  add(phi, 1.0, x, out);
+  apply_matrix(phi, power_of(phi, level), x, out);
+  add_vector(phi, 1.0, x, out);
 }
 
 /* From a level to the next: the first `count` of the a_j of one force */
 static void double_up(const mstmm_phi *phi, int level, int first, int count) {
   const double tau = ldexp(1.0, level);
   for (int j = 0; j < count; j++) {
-    double *to = moved_of(phi, level + 1, first + j), weight = 1.0;
-    exponential_of(phi, level, moved_of(phi, level, first + j), to);
+    double *to = moved_row(phi, level + 1, first + j), weight = 1.0;
+    apply_exponential(phi, level, moved_row(phi, level, first + j), to);
     for (int l = j; l >= 0; l--) {
-      add(phi, weight, moved_of(phi, level, first + l), to);
+      add_vector(phi, weight, moved_row(phi, level, first + l), to);
       weight *= tau / (j - l + 1);
     }
   }
@@ -243,7 +243,7 @@ void mstmm_phi_force(const mstmm_phi *phi, int k, const double *c) {
     force[i] = ldexp(c[i] / phi->scale[i], -(k + 1) * levels);
   memcpy(d, force, (size_t)phi->row * sizeof(double));
   for (int j = 0; j < count; j++) {
-    to[j] = moved_of(phi, 0, first + j);
+    to[j] = moved_row(phi, 0, first + j);
     memset(to[j], 0, (size_t)phi->row * sizeof(double));
   }
   add_series(phi, 1.0, count, d, to);
@@ -251,12 +251,12 @@ void mstmm_phi_force(const mstmm_phi *phi, int k, const double *c) {
 }
 
 void mstmm_phi_part(const mstmm_phi *phi, int k, double *part) {
-  const double *found = moved_of(phi, (int)*phi->levels, k * (k + 1) / 2 + k);
+  const double *found = moved_row(phi, (int)*phi->levels, k * (k + 1) / 2 + k);
   for (int i = 0; i < phi->n; i++) part[i] = phi->scale[i] * found[i];
 }
 
 /* w at `tau` from the start of the motion, by the series: each force by its own last a */
-static void begin(const mstmm_phi *phi, double tau, double *w) {
+static void begin_motion(const mstmm_phi *phi, double tau, double *w) {
   double *d = phi->scratch + phi->row, *unused = d + phi->row, *to[3];
   memset(w, 0, (size_t)phi->row * sizeof(double));
   for (int k = 0; k < 3; k++) {
@@ -268,11 +268,11 @@ static void begin(const mstmm_phi *phi, double tau, double *w) {
 }
 
 /* w moves on by the length of a level from `tau`, where the forces have gone on to be others. */
-static void go_on(const mstmm_phi *phi, int level, double tau, double *w) {
+static void continue_motion(const mstmm_phi *phi, int level, double tau, double *w) {
   double *moved = phi->scratch;
-  exponential_of(phi, level, w, moved);
+  apply_exponential(phi, level, w, moved);
   const double weights[PRODUCTS] = {1.0, tau, 1.0, 0.5 * tau * tau, tau, 1.0};
-  for (int i = 0; i < PRODUCTS; i++) add(phi, weights[i], moved_of(phi, level, i), moved);
+  for (int i = 0; i < PRODUCTS; i++) add_vector(phi, weights[i], moved_row(phi, level, i), moved);
   memcpy(w, moved, (size_t)phi->row * sizeof(double));
 }
 
@@ -282,10 +282,10 @@ void mstmm_phi_at(const mstmm_phi *phi, double theta, double *w) {
   const double steps = fmin(floor(place), whole - 1.0);
   const int64_t bits = (int64_t)steps;
   double *at = phi->scratch + 3 * phi->row, tau = place - steps;
-  begin(phi, tau, at);
+  begin_motion(phi, tau, at);
   for (int level = 0; level < levels; level++) {
     if (!(bits >> level & 1)) continue;
-    go_on(phi, level, tau, at);
+    continue_motion(phi, level, tau, at);
     tau += ldexp(1.0, level);
   }
   for (int i = 0; i < phi->n; i++) w[i] = phi->scale[i] * at[i];

@@ -1,15 +1,11 @@
 /* Steps of several trajectories in SIMD lanes; see lanes.h.  Component i of a lane is at
  * [i * lanes + lane], so that all arithmetic but that of step control goes over whole vectors. */
-#ifndef _POSIX_C_SOURCE
-#define _POSIX_C_SOURCE 199309L /* clock_gettime */
-#endif
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
 #include "lanes_step.h"
 
-static int64_t row_of(const mstmm_system *system) {
+static int64_t lanes_row(const mstmm_system *system) {
   return ((int64_t)system->n_state * system->lanes + GROUP - 1) / GROUP * GROUP;
 }
 
@@ -18,16 +14,16 @@ int64_t mstmm_group_size(const mstmm_system *system, const mstmm_tableau *tablea
                     !mstmm_n_watched(system) && !system->n_memory &&
                     mstmm_workspace_size(system, tableau) > 0;
   const int64_t rows = tableau->n_stages + 1 + tableau->n_extra + tableau->n_dense + 4;
-  return sound ? rows * row_of(system) + system->n_state + GROUP : 0;
+  return sound ? rows * lanes_row(system) + system->n_state + GROUP : 0;
 }
 
-static mstmm_cut_group cut(mstmm_group *group) {
+static mstmm_cut_group cut_group(mstmm_group *group) {
   const mstmm_system *system = group->system;
   const mstmm_tableau *tableau = group->many->problem.tableau;
   const uintptr_t rest = (uintptr_t)group->workspace % 64;
   double *at = group->workspace + (rest ? (64 - rest) / sizeof(double) : 0);
   mstmm_cut_group c = {.group = group, .system = system, .tableau = tableau, .lanes = system->lanes,
-                 .n = system->n_state, .row = row_of(system)};
+                 .n = system->n_state, .row = lanes_row(system)};
   c.y = at;
   c.k = c.y + c.row;
   c.y_new = c.k + (tableau->n_stages + 1 + tableau->n_extra) * c.row;
@@ -67,7 +63,7 @@ static double *sample(const mstmm_cut_group *c, int lane) {
   return many->samples + (first + c->group->runs[lane].count.output_index) * c->n;
 }
 
-static void sample_current(const mstmm_cut_group *c, int lane) {
+static void sample_lane(const mstmm_cut_group *c, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   int64_t *i = &run->count.output_index;
   for (; *i < run->n_outputs && run->outputs[*i] <= run->real.t; (*i)++)
@@ -75,7 +71,7 @@ static void sample_current(const mstmm_cut_group *c, int lane) {
 }
 
 /* Puts the lane at the start of the next trajectory; 0 if there is none. */
-static int take_up(const mstmm_cut_group *c, int lane) {
+static int start_next_trajectory(const mstmm_cut_group *c, int lane) {
   mstmm_group *group = c->group;
   mstmm_many *many = group->many;
   mstmm_run *run = &group->runs[lane];
@@ -94,7 +90,7 @@ static int take_up(const mstmm_cut_group *c, int lane) {
   if (group->enter) group->enter(c->system->context, lane, next);
   const int64_t bad = mstmm_lane_not_finite(c, c->y, lane);
   if (bad >= 0) finish(c, lane, mstmm_note(run, MSTMM_NOT_FINITE, 0, bad, run->t_start));
-  else sample_current(c, lane);
+  else sample_lane(c, lane);
   return 1;
 }
 
@@ -104,7 +100,7 @@ static int refill(const mstmm_cut_group *c) {
   const int64_t before = __atomic_load_n(&group->many->next, __ATOMIC_RELAXED);
   int active = -1;
   for (int lane = 0; lane < c->lanes; lane++) {
-    while (group->trajectory[lane] < 0 && take_up(c, lane)) {
+    while (group->trajectory[lane] < 0 && start_next_trajectory(c, lane)) {
     }
     if (group->trajectory[lane] >= 0 && active < 0) active = lane;
   }
@@ -214,7 +210,7 @@ static int aim(const mstmm_cut_group *c, mstmm_attempt *a) {
 }
 
 /* True if the error of an active lane is small enough. */
-static int good(const mstmm_cut_group *c, const mstmm_attempt *a, int lane) {
+static int is_lane_accepted(const mstmm_cut_group *c, const mstmm_attempt *a, int lane) {
   return a->active[lane] && !a->failed[lane] &&
          (c->group->runs[lane].fixed_step > 0.0 || a->error[lane] < 1.0 ||
           mstmm_in_gap(&c->group->runs[lane]));
@@ -238,7 +234,7 @@ static void sample_inside(const mstmm_cut_group *c, int lane) {
 }
 
 /* Calls accept on the lane's new state.  1 if the first stage is to be forgotten, a failure, 0. */
-static int settle(const mstmm_cut_group *c, int lane) {
+static int settle_lane_state(const mstmm_cut_group *c, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   if (!c->system->accept) return 0;
   gather(c, c->y_new, lane, c->one);
@@ -250,13 +246,13 @@ static int settle(const mstmm_cut_group *c, int lane) {
 }
 
 /* The lane's state becomes the end of the step.  Returns 1 if the last stage serves the next. */
-static int accept(const mstmm_cut_group *c, mstmm_attempt *a, int lane) {
+static int accept_lane(const mstmm_cut_group *c, mstmm_attempt *a, int lane) {
   mstmm_run *run = &c->group->runs[lane];
   if (run->fixed_step == 0.0) mstmm_propose(run, a->error[lane]);
   mstmm_count_step(run, a->error[lane], 0.0);
   c->group->retries[lane] = 0;
   sample_inside(c, lane);
-  const int status = settle(c, lane);
+  const int status = settle_lane_state(c, lane);
   if (status < 0) {
     finish(c, lane, status);
     a->failed[lane] = status;
@@ -270,7 +266,7 @@ static int accept(const mstmm_cut_group *c, mstmm_attempt *a, int lane) {
 }
 
 /* Accepts or rejects the attempt of each lane. */
-static void judge(const mstmm_cut_group *c, mstmm_attempt *a) {
+static void finish_attempts(const mstmm_cut_group *c, mstmm_attempt *a) {
   mstmm_group *group = c->group;
   int moved[GROUP] = {0}, kept_stage[GROUP] = {0}, any_dense = 0;
   for (int lane = 0; lane < c->lanes; lane++) {
@@ -278,14 +274,14 @@ static void judge(const mstmm_cut_group *c, mstmm_attempt *a) {
     if (a->active[lane] && !a->failed[lane] && !isfinite(a->error[lane]))
       a->failed[lane] = mstmm_note(run, MSTMM_NOT_FINITE, 0, mstmm_lanes_worst(c, lane),
                                    run->real.t_new);
-    a->wants_dense[lane] = good(c, a, lane) && mstmm_output_inside(run);
+    a->wants_dense[lane] = is_lane_accepted(c, a, lane) && mstmm_output_inside(run);
     any_dense |= a->wants_dense[lane];
   }
   if (any_dense) mstmm_lanes_dense(c, a);
   for (int lane = 0; lane < c->lanes; lane++) {
     if (!a->active[lane]) continue;
-    if (good(c, a, lane)) {
-      kept_stage[lane] = accept(c, a, lane);
+    if (is_lane_accepted(c, a, lane)) {
+      kept_stage[lane] = accept_lane(c, a, lane);
       moved[lane] = !a->failed[lane];
       continue;
     }
@@ -298,7 +294,7 @@ static void judge(const mstmm_cut_group *c, mstmm_attempt *a) {
   mstmm_lanes_move(c, moved, kept_stage);
   for (int lane = 0; lane < c->lanes; lane++) {
     if (!moved[lane]) continue;
-    sample_current(c, lane);
+    sample_lane(c, lane);
     if (group->runs[lane].real.t >= group->many->problem.t_end) finish(c, lane, MSTMM_FINISHED);
   }
 }
@@ -313,7 +309,7 @@ int mstmm_group_start(mstmm_group *group) {
   memset(group->workspace, 0, (size_t)size * sizeof(double));
   memset(group->runs, 0, sizeof group->runs);
   for (int lane = 0; lane < GROUP; lane++) group->trajectory[lane] = -1;
-  const mstmm_cut_group c = cut(group);
+  const mstmm_cut_group c = cut_group(group);
   for (int64_t i = 0; i < c.row; i++) {
     const int64_t component = i / c.lanes;
     const int counts = problem->atol && component < c.system->n_error;
@@ -322,24 +318,18 @@ int mstmm_group_start(mstmm_group *group) {
   return 0;
 }
 
-static double seconds(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 int mstmm_group_advance(mstmm_group *group, double wall_seconds) {
-  const mstmm_cut_group c = cut(group);
-  const double deadline = seconds() + wall_seconds;
+  const mstmm_cut_group c = cut_group(group);
+  const double deadline = mstmm_seconds() + wall_seconds;
   for (int turn = 1; refill(&c); turn++) {
     mstmm_attempt a = {.h = {0.0}};
     first_stages(&c);
     if (aim(&c, &a)) {
       mstmm_lanes_stages(&c, &a);
       mstmm_lanes_errors(&c, &a);
-      judge(&c, &a);
+      finish_attempts(&c, &a);
     }
-    if (turn % 64 == 0 && seconds() >= deadline) return MSTMM_RUNNING;
+    if (turn % 64 == 0 && mstmm_seconds() >= deadline) return MSTMM_RUNNING;
   }
   return MSTMM_FINISHED;
 }

@@ -75,6 +75,9 @@ double mstmm_step_from(const mstmm_slopes *at, double guess, const double *f1, i
 /* RMS of one error vector, or the combination of two, from sums of squares of n components. */
 double mstmm_combined_error(double h, double high, double low, int64_t n, int both);
 
+/* Time of a clock that only goes on. */
+double mstmm_seconds(void);
+
 /* Makes the next step, shorter and shorter until its error is small enough. */
 int mstmm_try_step(const mstmm_work *work);
 

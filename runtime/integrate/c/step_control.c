@@ -175,7 +175,7 @@ int mstmm_output_inside(const mstmm_run *run) {
 }
 
 /* One attempt; *error < 1 on success.  0, or the status of a stage that could not be evaluated. */
-static int attempt(const mstmm_work *work, double *error, double *absolute) {
+static int attempt_step(const mstmm_work *work, double *error, double *absolute) {
   mstmm_run *run = work->run;
   *error = *absolute = 0.0;
   int status = mstmm_aim(run);
@@ -207,7 +207,7 @@ int mstmm_try_step(const mstmm_work *work) {
                                              : mstmm_initial_step(work, mstmm_interval(run));
   run->count.rejected_last = 0;
   for (;;) {
-    const int failed = attempt(work, &error, &absolute) != 0;
+    const int failed = attempt_step(work, &error, &absolute) != 0;
     if (!failed && (fixed || error < 1.0)) break;
     status = mstmm_reject(run, failed, error);
     if (status && !failed) run->count.component = mstmm_worst_component(work);
