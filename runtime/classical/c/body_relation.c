@@ -14,7 +14,7 @@ static int place_of(const step_record *step, int column)
 
 /* x = U_ff^-1 (known - U_f), known LOADS x columns (NULL: zero). */
 static int input_relation(const step_record *step, int body, const real *matrix, const real *known,
-                    real *x)
+                          real *x)
 {
     const int rigid = step->rigid, length = length_of(step, body), columns = columns_of(step, body);
     real carried[LOADS * LOADS];

@@ -66,7 +66,8 @@ void classical_axis(const real *axes, real *axis)
     for (int i = 0; i < 3; i++) axis[i] = axes[3 * i + 2];
 }
 
-/* The axis of a pin: its inboard section's, or behind springs, which tilt it, its outboard one's. */
+/* Axis of a pin: of its inboard section, or outboard of springs, which tilt it, of its outboard
+ * section. */
 void classical_pin_axis(const step_record *step, int index, real *axis)
 {
     const section held = classical_section(step, index);

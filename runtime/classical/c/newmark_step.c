@@ -44,8 +44,7 @@ static void predict(const step_record *step, int index, double h)
         const real a = start->auxiliary[i], rate = start->rate[i];
         const real next = (rate - scheme->alpha_m * a) / (1 - scheme->alpha_m);
         at->auxiliary[i] = next;
-        at->speed[i] =
-            start->speed[i] + h * ((1 - scheme->gamma) * a + scheme->gamma * next);
+        at->speed[i] = start->speed[i] + h * ((1 - scheme->gamma) * a + scheme->gamma * next);
         at->position[i] = start->position[i] + h * start->speed[i] +
                           h * h * ((0.5 - scheme->beta) * a + scheme->beta * next);
     }
@@ -112,8 +111,7 @@ static real hinge_gap(const step_record *step, int index)
         return 0;
     const section held = classical_section(step, index);
     real gap = 0;
-    for (int i = 0; i < step->shifts; i++)
-        gap = hypot(gap, at->position[i] - held.position[i]);
+    for (int i = 0; i < step->shifts; i++) gap = hypot(gap, at->position[i] - held.position[i]);
     return gap / step->run->size;
 }
 
@@ -149,11 +147,13 @@ static int one_step(run_record *run, double h)
 {
     const mstmm_classical_scheme *scheme = &run->scheme;
     const double length = scheme->theta * h, weight = scheme->beta * length * length;
-    const step_record step = {
-        run, (element *)run->work,
-        {(1 - scheme->alpha_m) / ((1 - scheme->alpha_f) * weight),
-         scheme->gamma / (scheme->beta * length), 1 / weight},
-        run->planar ? 2 : 3, run->planar ? 1 : 3, run->planar ? 3 : 6};
+    const step_record step = {run,
+                              (element *)run->work,
+                              {(1 - scheme->alpha_m) / ((1 - scheme->alpha_f) * weight),
+                               scheme->gamma / (scheme->beta * length), 1 / weight},
+                              run->planar ? 2 : 3,
+                              run->planar ? 1 : 3,
+                              run->planar ? 3 : 6};
     for (int i = 0; i < run->n_bodies; i++) {
         motion *start = &step.elements[i].start;
         *start = run->motions[i];

@@ -171,8 +171,7 @@ static int boundary(const step_record *step, int index, int held, real *system)
         boundary_row(count, unknown, others, known, one->condition + length * k,
                      system + width * rows);
     for (int k = 0; !held && k < modes; k++, rows++)
-        boundary_row(count, unknown, others, known, one->modal + length * k,
-                     system + width * rows);
+        boundary_row(count, unknown, others, known, one->modal + length * k, system + width * rows);
     for (int k = 0; k < rows; k++) scale_row(width, system + width * k);
     return rows;
 }

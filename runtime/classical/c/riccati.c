@@ -5,7 +5,7 @@
 
 /* Conditions and modal rows with the loads put in, as rows on the state behind the hinge. */
 static int outboard_rows(const step_record *step, int index, const real *relation, real *conditions,
-                       real *modal)
+                         real *modal)
 {
     const int length = length_of(step, index), columns = columns_of(step, index);
     const int modes = modes_of(step, index), free = classical_free_turns(step, index);
@@ -47,7 +47,8 @@ static int pass_relation(const step_record *step, int index, const real *behind)
 }
 
 /* A free body: S a + e = 0 and its modal rows give the motion. */
-static int solve_free_body(const step_record *step, int index, const real *behind, const real *modal)
+static int solve_free_body(const step_record *step, int index, const real *behind,
+                           const real *modal)
 {
     const int rigid = step->rigid, modes = modes_of(step, index), size = rigid + modes;
     const int width = size + 1, length = length_of(step, index);
@@ -76,7 +77,8 @@ int classical_riccati(const step_record *step)
         const int free = step->run->bodies[i].hinge == MSTMM_CLASSICAL_FREE;
         real *hinge = step->elements[i].hinge;
         if (free ? solve_free_body(step, i, behind, modal)
-                 : classical_hinge(step, i, conditions, modal, hinge) || pass_relation(step, i, behind))
+                 : classical_hinge(step, i, conditions, modal, hinge) ||
+                       pass_relation(step, i, behind))
             return fail(step->run, MSTMM_CLASSICAL_SINGULAR, i);
     }
     return 0;

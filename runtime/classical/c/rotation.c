@@ -21,7 +21,7 @@ void classical_exponential(const real *v, real *rotation)
     const real x = v[0] * v[0] + v[1] * v[1] + v[2] * v[2], angle = sqrt(x);
     if (angle < 1e-2) {
         combine_skew(v, 1 - x / 6 * (1 - x / 20 * (1 - x / 42)),
-                 0.5 * (1 - x / 12 * (1 - x / 30 * (1 - x / 56))), rotation);
+                     0.5 * (1 - x / 12 * (1 - x / 30 * (1 - x / 56))), rotation);
         return;
     }
     const real half = sin(angle / 2) / angle;
@@ -41,13 +41,12 @@ void classical_inverse_tangent(const real *v, real *matrix)
 /* Unit quaternion w, x, y, z of a rotation matrix, w not below zero. */
 void classical_quaternion(const real *r, real *quaternion)
 {
-    const real squares[4] = {1 + r[0] + r[4] + r[8], 1 + r[0] - r[4] - r[8],
-                             1 - r[0] + r[4] - r[8], 1 - r[0] - r[4] + r[8]};
-    const real products[4][4] = {
-        {squares[0], r[7] - r[5], r[2] - r[6], r[3] - r[1]},
-        {r[7] - r[5], squares[1], r[1] + r[3], r[2] + r[6]},
-        {r[2] - r[6], r[1] + r[3], squares[2], r[5] + r[7]},
-        {r[3] - r[1], r[2] + r[6], r[5] + r[7], squares[3]}};
+    const real squares[4] = {1 + r[0] + r[4] + r[8], 1 + r[0] - r[4] - r[8], 1 - r[0] + r[4] - r[8],
+                             1 - r[0] - r[4] + r[8]};
+    const real products[4][4] = {{squares[0], r[7] - r[5], r[2] - r[6], r[3] - r[1]},
+                                 {r[7] - r[5], squares[1], r[1] + r[3], r[2] + r[6]},
+                                 {r[2] - r[6], r[1] + r[3], squares[2], r[5] + r[7]},
+                                 {r[3] - r[1], r[2] + r[6], r[5] + r[7], squares[3]}};
     int best = 0;
     for (int i = 1; i < 4; i++)
         if (squares[i] > squares[best]) best = i;

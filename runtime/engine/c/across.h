@@ -22,12 +22,10 @@ void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own);
 /* Rows of hinges that close loops, of the derivatives' workspace: to `rows`. */
 void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows);
 /* Instead of efforts: errors of the accelerations of closing hinges. */
-void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
-                   real *required);
+void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own, real *required);
 
 /* Numbers of a row of the loops in a workspace. */
-static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace,
-                                      int row)
+static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace, int row)
 {
     return workspace + model->loops + MSTMM_ROW * (int64_t)row;
 }

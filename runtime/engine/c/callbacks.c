@@ -2,9 +2,9 @@
 #include <math.h>
 #include <string.h>
 
-#include "event_bounds.h"
 #include "bounce.h"
 #include "control.h"
+#include "event_bounds.h"
 #include "kernel_calls.h"
 #include "loops.h"
 #include "scene.h"
@@ -23,9 +23,9 @@ static int scene_rhs(void *context, double t, const double *y, double *dy)
     const double *u = y + model->nq;
     int code = mstmm_stage_state(run, t, &y, &u);
     if (!code)
-        code = mstmm_accelerations(model, run->workspace, t, y, u, run->memory, NULL, dy,
-                                   dy + model->nq, run->with_power ? &balance : NULL,
-                                   &run->failure);
+        code =
+            mstmm_accelerations(model, run->workspace, t, y, u, run->memory, NULL, dy,
+                                dy + model->nq, run->with_power ? &balance : NULL, &run->failure);
     if (run->with_power) dy[model->nq + model->nu] = code ? 0 : balance.power;
     return code;
 }
@@ -52,8 +52,8 @@ static int project_state(mstmm_scene_run *run, real t, real *y)
 {
     const mstmm_model *model = run->model;
     mstmm_unit_quaternions(run->n_quaternions, run->quaternions, y);
-    const int code = mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory,
-                                       &run->failure);
+    const int code =
+        mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory, &run->failure);
     return code || !model->looped ? code : mstmm_scene_close_loops(run, t, y);
 }
 
@@ -109,8 +109,12 @@ static int scene_events(void *context, double t, const double *y, double *g)
     mstmm_scene_run *run = context;
     int code = project_inside(run, t, &y);
     const real *u = y + run->model->nq;
-    mstmm_state state = {.model = run->model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory, .observed = 1, .failure = &run->failure};
+    mstmm_state state = {.model = run->model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .memory = run->memory,
+                         .observed = 1,
+                         .failure = &run->failure};
     if (!code) code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
     const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
@@ -141,8 +145,7 @@ static int needs_settling(const mstmm_scene_run *run)
     const mstmm_model *model = run->model;
     for (int k = 0; k < model->n_laws; k++)
         if (model->laws[k].twist >= 0) return 1;
-    return run->n_quaternions > 0 || model->n_drives > 0 || run->n_controllers > 0 ||
-           model->looped;
+    return run->n_quaternions > 0 || model->n_drives > 0 || run->n_controllers > 0 || model->looped;
 }
 
 void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)

@@ -24,8 +24,8 @@ static inline void inertia_sizes(const mstmm_complex *S, mstmm_lanes *sizes)
 }
 
 /* Contributions of bodies at s, numbers `first` to before `end`, written from `to`. */
-static void write_contributions(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first, int64_t end,
-                  mstmm_complex *to)
+static void write_contributions(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first,
+                                int64_t end, mstmm_complex *to)
 {
     const real *by_rate = of->brought, *by_square = by_rate + of->n_numbers;
     const real *lost = by_square + of->n_numbers;
@@ -67,7 +67,8 @@ static mstmm_complex *effect_entry(mstmm_complex *S, mstmm_complex *bend, int n,
 }
 
 /* Frames are described by accelerations: s^2 times their displacements. */
-static void write_exact_body(const mstmm_response *of, mstmm_lanes_at *with, int body, int64_t first)
+static void write_exact_body(const mstmm_response *of, mstmm_lanes_at *with, int body,
+                             int64_t first)
 {
     const mstmm_body *one = &of->at->model->bodies[body];
     const int n = mstmm_modes_of(one->modal), size = 6 + n;
@@ -79,8 +80,8 @@ static void write_exact_body(const mstmm_response *of, mstmm_lanes_at *with, int
         for (int k = 0; k < size; k++) {
             mstmm_complex value, *to = effect_entry(S, bend, n, j, k);
             for (int lane = 0; lane < MSTMM_LANES; lane++) {
-                const real *from = of->exact
-                    + 2 * (with->place[lane] * of->exact_numbers + first + j * size + k);
+                const real *from =
+                    of->exact + 2 * (with->place[lane] * of->exact_numbers + first + j * size + k);
                 value.re[lane] = from[0];
                 value.im[lane] = from[1];
             }
@@ -118,7 +119,7 @@ static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, in
 /* Prefetches the numbers of a body for a sweep: contributions common to all frequencies, if
  * `brought`, results of the elimination, loads and motions. */
 static inline void prefetch_body(const mstmm_response *of, const mstmm_lanes_at *with, int index,
-                           int brought)
+                                 int brought)
 {
     const mstmm_model *model = of->at->model;
     if (index < 0 || index >= model->n_bodies) return;
@@ -150,11 +151,11 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
     with->grown = -1 + (mstmm_bits){0};
     for (int i = model->n_bodies - 1; i >= 0; i--) {
         const mstmm_body *body = &model->bodies[i];
-        const mstmm_complex *S =
-            with->tangents.numbers + mstmm_carried_at(&with->tangents, body);
+        const mstmm_complex *S = with->tangents.numbers + mstmm_carried_at(&with->tangents, body);
         const int least = mstmm_least_parent(model, i, i + 1);
         while (begun > least) {
-            if (mstmm_beyond_cache(model)) prefetch_body(of, with, begun - 1 - MSTMM_COMPLEX_AHEAD, 1);
+            if (mstmm_beyond_cache(model))
+                prefetch_body(of, with, begun - 1 - MSTMM_COMPLEX_AHEAD, 1);
             write_body_contributions(of, with, --begun);
         }
         for (; next < of->n_exact && of->exact_bodies[next] >= begun; next++) {
@@ -178,7 +179,7 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
 }
 
 static int solve_tree_in_lanes(const mstmm_response *of, mstmm_lanes_at *with,
-                       const mstmm_complex *column, mstmm_complex *unit, mstmm_complex *x)
+                               const mstmm_complex *column, mstmm_complex *unit, mstmm_complex *x)
 {
     mstmm_complex_state *state = &with->state;
     const int n = state->model->n_bodies, ahead = MSTMM_COMPLEX_AHEAD;
@@ -209,7 +210,7 @@ static int solve_tree_in_lanes(const mstmm_response *of, mstmm_lanes_at *with,
 
 /* Change of every coupling along x, lane by lane, real and imaginary parts one after the other. */
 static int coupling_changes(mstmm_response *of, const mstmm_lanes_at *with, const mstmm_complex *x,
-                         mstmm_complex *changes)
+                            mstmm_complex *changes)
 {
     const int nu = of->at->model->nu, m = of->at->n_coupled;
     real *moved = of->scratch, *d_u = moved + nu, *d_a = d_u + nu, *found = d_a + nu;
@@ -253,8 +254,8 @@ static int close_couplings(mstmm_response *of, mstmm_lanes_at *with)
     for (int k = 0; k < m; k++) {
         mstmm_complex *answer = (mstmm_complex *)of->answers + (int64_t)k * nu, *unit = NULL;
         if (k < loads)
-            unit = mstmm_block(model, with->slope.workspace, all->bodies[k / 6])
-                   + MSTMM_BLOCK_E + k % 6;
+            unit = mstmm_block(model, with->slope.workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E +
+                   k % 6;
         else
             column[all->speeds[k - loads]] = mstmm_complex_plain(1);
         int code = solve_tree_in_lanes(of, with, column, unit, answer);
@@ -279,8 +280,8 @@ static int add_couplings(mstmm_response *of, const mstmm_lanes_at *with, mstmm_c
     for (int k = 0; !code && k < m; k++) {
         mstmm_complex amount = mstmm_complex_plain(0);
         for (int i = 0; i < m; i++)
-            amount = mstmm_complex_plus(amount,
-                                        mstmm_complex_times(inverse[k * m + i], changes[i]));
+            amount =
+                mstmm_complex_plus(amount, mstmm_complex_times(inverse[k * m + i], changes[i]));
         const mstmm_complex *answer = (mstmm_complex *)of->answers + (int64_t)k * nu;
         for (int j = 0; j < nu; j++)
             x[j] = mstmm_complex_plus(x[j], mstmm_complex_times(answer[j], amount));
@@ -301,11 +302,14 @@ static void set_up_lanes(mstmm_response *of, int count, const real *s, mstmm_lan
     }
     with->square = mstmm_complex_times(with->s, with->s);
     with->slope.workspace = (mstmm_complex *)of->workspace;
-    with->tangents = (mstmm_complex_tangents){
-        .numbers = (mstmm_complex *)of->numbers, .held = at->numbers};
-    with->state = (mstmm_complex_state){
-        .model = at->model, .workspace = at->workspace, .memory = at->memory,
-        .slope = &with->slope, .tangents = &with->tangents, .failure = &at->failure};
+    with->tangents =
+        (mstmm_complex_tangents){.numbers = (mstmm_complex *)of->numbers, .held = at->numbers};
+    with->state = (mstmm_complex_state){.model = at->model,
+                                        .workspace = at->workspace,
+                                        .memory = at->memory,
+                                        .slope = &with->slope,
+                                        .tangents = &with->tangents,
+                                        .failure = &at->failure};
 }
 
 #define MSTMM_BY_LANES_OF(lanes) mstmm_response_by_##lanes

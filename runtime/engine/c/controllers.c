@@ -14,14 +14,24 @@ int mstmm_measured(mstmm_scene_run *run, const mstmm_measure *measure, real t, c
     const real *u = y + model->nq;
     if (measure->observes) {
         if (run->base) run->base->known = 0; /* for the workspace is the same */
-        const int code = mstmm_observe(model, run->workspace, t, y, u, run->memory, shown,
-                                       &run->failure);
+        const int code =
+            mstmm_observe(model, run->workspace, t, y, u, run->memory, shown, &run->failure);
         if (code) return code;
     }
-    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory, .failure = &run->failure};
-    const real *inputs[] = {&t, y, u, shown->points, shown->loads, shown->efforts, shown->udot,
-                            shown->sums, mstmm_input_numbers(&state)};
+    mstmm_state state = {.model = model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .memory = run->memory,
+                         .failure = &run->failure};
+    const real *inputs[] = {&t,
+                            y,
+                            u,
+                            shown->points,
+                            shown->loads,
+                            shown->efforts,
+                            shown->udot,
+                            shown->sums,
+                            mstmm_input_numbers(&state)};
     real *outputs[] = {numbers};
     return mstmm_tape_run(measure->tape, inputs, mstmm_slots(&state), outputs)
                ? MSTMM_FAILED_EXPRESSION
@@ -84,7 +94,8 @@ int mstmm_controllers_act(mstmm_scene_run *run, real t, const real *y)
     for (int k = 0; due && k < run->n_controllers; k++) {
         const mstmm_controller *one = &run->controllers[k];
         real *memory = run->memory + one->memory;
-        if (is_due(one, memory, t) && !update_controller(one, memory, t)) return note_controller_failure(run, k);
+        if (is_due(one, memory, t) && !update_controller(one, memory, t))
+            return note_controller_failure(run, k);
     }
     if (due && run->base) run->base->known = 0;
     return -due;

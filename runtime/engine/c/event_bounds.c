@@ -27,8 +27,8 @@ static int first_input(const mstmm_scene_run *run)
 static int n_inputs(const mstmm_scene_run *run) { return run->event_tape->input_lengths[4]; }
 
 /* Accelerations of the probes, by the difference of velocities a moment later */
-static void record_accelerations(mstmm_scene_run *run, double t, const double *y, const double *rates,
-                              double *seen)
+static void record_accelerations(mstmm_scene_run *run, double t, const double *y,
+                                 const double *rates, double *seen)
 {
     const int n = run->model->nq + run->model->nu;
     double soon = INFINITY;
@@ -44,11 +44,15 @@ static void record_accelerations(mstmm_scene_run *run, double t, const double *y
         }
 }
 
-static void record_quantities(void *context, double t, const double *y, const double *rates, double *seen)
+static void record_quantities(void *context, double t, const double *y, const double *rates,
+                              double *seen)
 {
     mstmm_scene_run *run = context;
-    mstmm_state state = {.model = run->model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory, .failure = &run->failure};
+    mstmm_state state = {.model = run->model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .memory = run->memory,
+                         .failure = &run->failure};
     double *probes = seen + first_probe(run);
     if (run->closes) y = run->probe_values + 6 * run->n_probes + MSTMM_PROBE_NUMBERS;
     seen[0] = t;
@@ -75,7 +79,7 @@ static mstmm_bounds quantity_bounds(double h, double a, double b, double rate_a,
 }
 
 static void bound_events(void *context, double h, const double *left, const double *right,
-                    mstmm_bounds *bounds)
+                         mstmm_bounds *bounds)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;

@@ -9,7 +9,7 @@ enum { END_NUMBERS = 12 };
 
 /* Arguments of a kernel for probe i; its time is not read. */
 #define GIVEN(points, q, u, i)                                                                     \
-    (points)->p, (points)->none, q, u, (points)->memory, (points)->ends + END_NUMBERS * (i)
+    (points)->p, (points)->none, q, u, (points)->memory, (points)->ends + END_NUMBERS *(i)
 
 static int has_finite_state(const mstmm_compiled_points *points, const real *q, const real *u)
 {
@@ -61,8 +61,8 @@ static kernel *jacobian_kernel(const mstmm_fused *code) { return code->jacobian;
 static kernel *jacobian_rate_kernel(const mstmm_fused *code) { return code->jacobian_rate; }
 
 /* `width` numbers of every probe. */
-static int evaluate_probes(const mstmm_compiled_points *points, chosen *of, const real *q, const real *u,
-                int64_t width, real *answer)
+static int evaluate_probes(const mstmm_compiled_points *points, chosen *of, const real *q,
+                           const real *u, int64_t width, real *answer)
 {
     int failed = !has_finite_state(points, q, u);
     for (int i = 0; !failed && i < points->n_probes; i++)

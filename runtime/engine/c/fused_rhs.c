@@ -61,8 +61,8 @@ static int fused_rhs(void *context, double t, const double *y, double *dy)
     const double *u = y + fused->nq;
     const int open = mstmm_stage_state(run, t, &y, &u);
     if (open) return open;
-    const int code = fused->accelerations(run->fused_p, &t, y, u, run->memory,
-                                          run->fused_numbers, dy, dy + fused->nq);
+    const int code = fused->accelerations(run->fused_p, &t, y, u, run->memory, run->fused_numbers,
+                                          dy, dy + fused->nq);
     return code ? mstmm_fused_failure(run, fused, code) : 0;
 }
 
@@ -79,20 +79,21 @@ static int fused_rhs_with_power(void *context, double t, const double *y, double
     const double *u = y + fused->nq;
     const int open = mstmm_stage_state(run, t, &y, &u);
     if (open) return open;
-    const int code = fused->accelerations_power(run->fused_p, &t, y, u, run->memory,
-                                                run->fused_numbers, dy, dy + fused->nq, &power,
-                                                &potential);
+    const int code =
+        fused->accelerations_power(run->fused_p, &t, y, u, run->memory, run->fused_numbers, dy,
+                                   dy + fused->nq, &power, &potential);
     dy[fused->nq + fused->nu] = code ? 0 : power;
     return code ? mstmm_fused_failure(run, fused, code) : 0;
 }
 
 static int fused_rhs_in_lanes(void *context, const double *t, const double *y, double *dy,
-                                  int *codes)
+                              int *codes)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused_lanes;
     const int64_t start = (int64_t)fused->nq * fused->lanes;
-    if (fused->n_memory) repeat_in_lanes(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
+    if (fused->n_memory)
+        repeat_in_lanes(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
     const int any = fused->accelerations_lanes(lanes_p(run), t, y, y + start, lanes_memory(run),
                                                lanes_efforts(run), dy, dy + start, codes);
     for (int lane = 0; any && lane < fused->lanes; lane++)
@@ -135,8 +136,8 @@ static void renew_lanes(const mstmm_scene_lanes *lanes, const double *t)
 
 /* mstmm_stage_speeds of one lane, in place among those of all.  Where there are none they stay:
  * what is evaluated with them says why. */
-static void project_lane_speeds(const mstmm_scene_lanes *lanes, int lane, real t, const real *y, real *speeds,
-                            real *one)
+static void project_lane_speeds(const mstmm_scene_lanes *lanes, int lane, real t, const real *y,
+                                real *speeds, real *one)
 {
     mstmm_scene_run *run = lanes->settle;
     const int64_t width = lanes->fused->lanes, nq = lanes->fused->nq, nu = lanes->fused->nu;
@@ -160,7 +161,8 @@ static const real *lanes_speeds(const mstmm_scene_lanes *lanes, const double *t,
     if (!any) return u;
     memcpy(speeds, u, (size_t)(width * nu) * sizeof(real));
     for (int lane = 0; lane < width; lane++)
-        if (lanes->near[lane]) project_lane_speeds(lanes, lane, t[lane], y, speeds, speeds + width * nu);
+        if (lanes->near[lane])
+            project_lane_speeds(lanes, lane, t[lane], y, speeds, speeds + width * nu);
     return speeds;
 }
 

@@ -1,11 +1,10 @@
-/* Hinge kernels that are interpreted, and derivatives of a hinge's rates one direction at a time; see
+/* Interpreted hinge kernels, and derivatives of the rates of a hinge by direction; see
  * hinge_call.h. */
 #include "hinge_call.h"
 
 #include "derivative_direction.h"
 
-int mstmm_hinge_interpreted(mstmm_state *state, const mstmm_body *body,
-                            struct mstmm_hinge_hinge to)
+int mstmm_hinge_interpreted(mstmm_state *state, const mstmm_body *body, struct mstmm_hinge_hinge to)
 {
     const real *inputs[MSTMM_HINGE_HINGE_INPUTS];
     real *outputs[MSTMM_HINGE_HINGE_OUTPUTS];
@@ -32,10 +31,10 @@ int mstmm_hinge_rates_along(mstmm_state *state, const mstmm_body *body, int of_s
             mstmm_aim_rate(state, body, i);
         else
             mstmm_aim_coordinate(state, body, i);
-        code = mstmm_hinge_slope_of(
-            state, body, .p = body->hinge_p, .q = state->q + body->q, .u = state->u + body->u,
-            .d_q = slope->q + body->q, .d_u = slope->u + body->u, .d_R = R, .d_d = d, .d_H = H,
-            .d_v = v, .d_w = w, .d_c = c, .d_qdot = rows + i * body->nq);
+        code = mstmm_hinge_slope_of(state, body, .p = body->hinge_p, .q = state->q + body->q,
+                                    .u = state->u + body->u, .d_q = slope->q + body->q,
+                                    .d_u = slope->u + body->u, .d_R = R, .d_d = d, .d_H = H,
+                                    .d_v = v, .d_w = w, .d_c = c, .d_qdot = rows + i * body->nq);
     }
     mstmm_aim_nowhere(state, body);
     return code;

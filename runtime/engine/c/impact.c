@@ -62,12 +62,20 @@ int mstmm_hook_struck(mstmm_state *state)
 /* Change of the speeds by efforts and forces along the derivatives of the event (NULL: none); it
  * includes the correction of velocity errors of closed loops. */
 static int speed_change(mstmm_scene_run *run, const mstmm_strike *strike, real t, const real *y,
-                    real *change)
+                        real *change)
 {
     const mstmm_model *model = run->model;
-    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t, .q = y,
-                         .u = y + model->nq, .memory = run->memory, .udot = change, .observed = 1,
-                         .level = MSTMM_SLIP, .strike = strike, .failure = &run->failure};
+    mstmm_state state = {.model = model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .q = y,
+                         .u = y + model->nq,
+                         .memory = run->memory,
+                         .udot = change,
+                         .observed = 1,
+                         .level = MSTMM_SLIP,
+                         .strike = strike,
+                         .failure = &run->failure};
     memset(change, 0, (size_t)model->nu * sizeof(real));
     state.given = change;
     state.qdot = mstmm_spare_qdot(&state);
@@ -76,8 +84,8 @@ static int speed_change(mstmm_scene_run *run, const mstmm_strike *strike, real t
 }
 
 /* How the event is met with other speeds than those of y. */
-static int approach_at(mstmm_scene_run *run, const mstmm_event_action *action, const real *slopes, real t,
-               const real *y, const real *u, mstmm_meeting *found)
+static int approach_at(mstmm_scene_run *run, const mstmm_event_action *action, const real *slopes,
+                       real t, const real *y, const real *u, mstmm_meeting *found)
 {
     const int code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
@@ -98,8 +106,8 @@ static int approach_at(mstmm_scene_run *run, const mstmm_event_action *action, c
 static int slopes_at(mstmm_scene_run *run, const mstmm_event_action *action, real t, const real *y,
                      real *slopes)
 {
-    mstmm_state state = {.model = run->model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory};
+    mstmm_state state = {
+        .model = run->model, .workspace = run->workspace, .t = t, .memory = run->memory};
     const real *u = y + run->model->nq;
     const int code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
@@ -111,12 +119,12 @@ static int slopes_at(mstmm_scene_run *run, const mstmm_event_action *action, rea
 }
 
 /* w = M^-1 A^T with closed loops, and the correction of their velocity errors without impact. */
-static int impulse_response(mstmm_scene_run *run, const mstmm_event_action *action, parts at, real t,
-                  const real *y)
+static int impulse_response(mstmm_scene_run *run, const mstmm_event_action *action, parts at,
+                            real t, const real *y)
 {
     const int nu = run->model->nu;
-    const mstmm_strike strike = {.run = run, .action = action, .slopes = at.slopes,
-                                 .efforts = at.efforts};
+    const mstmm_strike strike = {
+        .run = run, .action = action, .slopes = at.slopes, .efforts = at.efforts};
     memset(at.efforts, 0, (size_t)nu * sizeof(real));
     for (int k = 0; k < action->n_slopes; k++)
         if (action->places[2 * k] >= 0) at.efforts[action->places[2 * k + 1]] += at.slopes[1 + k];
@@ -175,8 +183,8 @@ int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y)
     int code = mstmm_meeting_of(run, event, t, y, y + run->model->nq, &before);
     if (!code && !(before.rate > 0)) return MSTMM_FIRE_CONTINUE; /* it leaves already */
     if (!code)
-        code = (run->with_power ? strike_with_work : strike)(run, event, impact_parts(run, action), t,
-                                                            y, before.rate);
+        code = (run->with_power ? strike_with_work : strike)(run, event, impact_parts(run, action),
+                                                             t, y, before.rate);
     if (code) return -code;
     *fastest = fmax(*fastest, before.rate);
     const int rests = action->restitution * before.rate < AT_REST * *fastest;

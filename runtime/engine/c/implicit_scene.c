@@ -12,8 +12,8 @@ static int note_tangent_failure(mstmm_scene_run *run, const mstmm_tangent *at, i
 }
 
 /* With closed loops: what accelerations are beyond those that the constrained motion has. */
-static int excess_accelerations(mstmm_scene_run *run, double t, const double *y, const double *a, double *r,
-                  mstmm_balance *balance)
+static int excess_accelerations(mstmm_scene_run *run, double t, const double *y, const double *a,
+                                double *r, mstmm_balance *balance)
 {
     const mstmm_model *model = run->model;
     real *qdot = run->known, *f = qdot + model->nq;
@@ -26,21 +26,21 @@ static int excess_accelerations(mstmm_scene_run *run, double t, const double *y,
 
 /* And than those by which steps end with closed gaps. */
 static int excess_placing_accelerations(void *context, double t, const double *y, const double *a,
-                          double closing, double *r)
+                                        double closing, double *r)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     real *qdot = run->known, *found = qdot + model->nq;
-    const int code = mstmm_placing_accelerations(model, run->workspace, closing, t, y,
-                                                 y + model->nq, a, run->memory, qdot, found,
-                                                 &run->failure);
+    const int code =
+        mstmm_placing_accelerations(model, run->workspace, closing, t, y, y + model->nq, a,
+                                    run->memory, qdot, found, &run->failure);
     for (int j = 0; !code && j < model->nu; j++) r[j] = a[j] - found[j];
     if (!code) mstmm_tangent_free(run->base, r);
     return code;
 }
 
 static int looped_residual(void *context, double t, const double *y, const double *a, double *r,
-                    double *work)
+                           double *work)
 {
     mstmm_scene_run *run = context;
     mstmm_balance balance;
@@ -50,8 +50,8 @@ static int looped_residual(void *context, double t, const double *y, const doubl
         if (wanted) *work = code ? 0 : balance.power;
         return code;
     }
-    const int code = mstmm_residual(run->stage, t, y, y + run->model->nq, a, r,
-                                    wanted ? &balance : NULL);
+    const int code =
+        mstmm_residual(run->stage, t, y, y + run->model->nq, a, r, wanted ? &balance : NULL);
     if (wanted) *work = code ? 0 : balance.power;
     return note_tangent_failure(run, run->stage, code);
 }
@@ -62,10 +62,12 @@ static int move_base(mstmm_scene_run *run, double t, const double *y, const doub
     const real *u = y + run->model->nq;
     if (run->model->looped) a = NULL; /* slopes are those of the accelerations there */
     if (mstmm_residual_is_at(run->base, t, y, u, a)) return 0;
-    return note_tangent_failure(run, run->base, mstmm_residual(run->base, t, y, u, a, run->known, NULL));
+    return note_tangent_failure(run, run->base,
+                                mstmm_residual(run->base, t, y, u, a, run->known, NULL));
 }
 
-static int looped_residual_rate(void *context, double t, const double *y, const double *a, double *r_t)
+static int looped_residual_rate(void *context, double t, const double *y, const double *a,
+                                double *r_t)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
@@ -80,12 +82,13 @@ static int looped_residual_rate(void *context, double t, const double *y, const 
         return note_tangent_failure(run, run->base, failure);
     }
     memset(still, 0, (size_t)(model->nq + 2 * model->nu) * sizeof(real));
-    return note_tangent_failure(run, run->base, mstmm_residual_slope(run->base, 1, still, still + model->nq,
-                                                       still + model->nq + model->nu, r_t));
+    return note_tangent_failure(run, run->base,
+                                mstmm_residual_slope(run->base, 1, still, still + model->nq,
+                                                     still + model->nq + model->nu, r_t));
 }
 
 static int looped_slope(void *context, double t, const double *y, const double *a, const double *dq,
-                 const double *du, double *d_rates, double *d_r)
+                        const double *du, double *d_rates, double *d_r)
 {
     mstmm_scene_run *run = context;
     int code = move_base(run, t, y, a);
@@ -102,26 +105,30 @@ static int looped_rates(void *context, const double *q, const double *u, double 
     return note_tangent_failure(run, run->stage, mstmm_tangent_rates(run->stage, q, u, dq));
 }
 
-static int looped_tangent(void *context, double t, const double *y, const double *a, double s, double sq,
-                   int kappa)
+static int looped_tangent(void *context, double t, const double *y, const double *a, double s,
+                          double sq, int kappa)
 {
     mstmm_scene_run *run = context;
     const int code = move_base(run, t, y, a);
-    return code ? code : note_tangent_failure(run, run->base, mstmm_tangent_factor(run->base, 1, s, sq, kappa));
+    return code ? code
+                : note_tangent_failure(run, run->base,
+                                       mstmm_tangent_factor(run->base, 1, s, sq, kappa));
 }
 
-static int looped_laws(void *context, double t, const double *y, const double *a, double s, double sq,
-                int kappa)
+static int looped_laws(void *context, double t, const double *y, const double *a, double s,
+                       double sq, int kappa)
 {
     mstmm_scene_run *run = context;
     const int code = move_base(run, t, y, a);
-    return code ? code : note_tangent_failure(run, run->base, mstmm_laws_factor(run->base, 1, s, sq, kappa));
+    return code ? code
+                : note_tangent_failure(run, run->base,
+                                       mstmm_laws_factor(run->base, 1, s, sq, kappa));
 }
 
 /* With the approximate tangent known increments use it too: methods that accept any tangent need
  * the same one everywhere. */
 static int looped_solve_by_laws(mstmm_scene_run *run, const double *r, const double *rho_q,
-                         const double *rho_u, double *dq, double *du, double *da)
+                                const double *rho_u, double *dq, double *du, double *da)
 {
     const int nu = run->model->nu, known = rho_q || rho_u;
     mstmm_tangent *base = run->base;
@@ -138,7 +145,7 @@ static int looped_solve_by_laws(mstmm_scene_run *run, const double *r, const dou
 
 /* Known increments: the coordinates' of rho_q, -rho_u of the accelerations. */
 static int looped_solve(void *context, const double *r, const double *rho_q, const double *rho_u,
-                 double *dq, double *du, double *da)
+                        double *dq, double *du, double *da)
 {
     mstmm_scene_run *run = context;
     const int nq = run->model->nq, nu = run->model->nu;
@@ -170,8 +177,13 @@ static int looped_impose(void *context, double t, double *y, double *a)
     const mstmm_model *model = run->model;
     mstmm_tangent_free(run->stage, a);
     if (!model->n_drives) return 0;
-    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t, .q = y,
-                         .u = y + model->nq, .memory = run->memory, .failure = &run->failure};
+    mstmm_state state = {.model = model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .q = y,
+                         .u = y + model->nq,
+                         .memory = run->memory,
+                         .failure = &run->failure};
     const int code = mstmm_run_given(&state);
     if (code) return code;
     memcpy(y, state.q, (size_t)model->nq * sizeof(real));
@@ -207,16 +219,24 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
         for (int j = 0; j < body->nu; j++) /* the vector part of a quaternion is last */
-            run->coordinates[body->u + j] = body->q + j
-                                            + (j + 3 >= body->nu ? body->nq - body->nu : 0);
+            run->coordinates[body->u + j] =
+                body->q + j + (j + 3 >= body->nu ? body->nq - body->nu : 0);
         for (int j = 0; body->modal && j < body->modal->n; j++)
             run->coordinates[body->modal->u + j] = body->modal->q + j;
     }
     run->implicit = (mstmm_implicit){
-        .n_q = model->nq, .n_u = model->nu, .evaluated = model->looped != NULL, .coordinates = run->coordinates, .residual = looped_residual,
-        .residual_rate = looped_residual_rate, .rates = is_straight(model) ? NULL : looped_rates,
-        .tangent = looped_tangent, .laws = model->looped ? NULL : looped_laws,
-        .laws_spare = 1, .solve = looped_solve, .slope = looped_slope,
+        .n_q = model->nq,
+        .n_u = model->nu,
+        .evaluated = model->looped != NULL,
+        .coordinates = run->coordinates,
+        .residual = looped_residual,
+        .residual_rate = looped_residual_rate,
+        .rates = is_straight(model) ? NULL : looped_rates,
+        .tangent = looped_tangent,
+        .laws = model->looped ? NULL : looped_laws,
+        .laws_spare = 1,
+        .solve = looped_solve,
+        .slope = looped_slope,
         .impose = has_imposed_speeds(model) ? looped_impose : NULL,
     };
     system->implicit = &run->implicit;

@@ -8,11 +8,17 @@
 #include "sweep_steps.h"
 
 static mstmm_state kinematic_state(const mstmm_kinematics *known, const real *q, const real *u,
-                            const real *udot, mstmm_failure *failure)
+                                   const real *udot, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = known->model, .workspace = known->workspace,
-                         .memory = known->memory, .q = q, .u = u, .given = udot,
-                         .required = known->work, .observed = 1, .failure = failure};
+    mstmm_state state = {.model = known->model,
+                         .workspace = known->workspace,
+                         .memory = known->memory,
+                         .q = q,
+                         .u = u,
+                         .given = udot,
+                         .required = known->work,
+                         .observed = 1,
+                         .failure = failure};
     state.qdot = mstmm_spare_qdot(&state);
     mstmm_ground(&state);
     return state;
@@ -25,12 +31,13 @@ int mstmm_moving_points(const mstmm_kinematics *known, int64_t n, const real *q,
     const mstmm_model *model = known->model;
     for (int64_t k = 0; k < n; k++) {
         mstmm_state state = kinematic_state(known, q + k * model->nq, u + k * model->nu,
-                                     udot + k * model->nu, failure);
+                                            udot + k * model->nu, failure);
         const int code = mstmm_run_motion(&state);
         if (code) return code;
         for (int i = 0; i < n_probes; i++)
             mstmm_point_shown(&state, &probes[i], mstmm_zeros,
-                              points + ((size_t)k * (size_t)n_probes + (size_t)i) * MSTMM_PROBE_NUMBERS);
+                              points +
+                                  ((size_t)k * (size_t)n_probes + (size_t)i) * MSTMM_PROBE_NUMBERS);
     }
     return 0;
 }
@@ -42,8 +49,7 @@ static int path_efforts(mstmm_state *state, const mstmm_probe *probe, int direct
     real load[6] = {0};
     load[direction] = -1;
     for (int i = probe->body; i >= 0; i = bodies[i].parent)
-        memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0,
-               6 * sizeof(real));
+        memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
     real *block = mstmm_block(state->model, state->workspace, probe->body);
     mstmm_frames_applied_load(.A = block + MSTMM_BLOCK_A, .A_F = mstmm_identity,
                               .offset = probe->offset, .F = load, .M = load + 3,
@@ -82,7 +88,7 @@ int mstmm_jacobians(const mstmm_kinematics *known, const real *q, int n_probes,
 
 /* A state after a sweep of its motion; returns 0 where it has none. */
 static int run_motion(const mstmm_points *points, const real *q, const real *u, mstmm_state *state,
-                 mstmm_failure *failure)
+                      mstmm_failure *failure)
 {
     const mstmm_model *model = points->at.model;
     if (!mstmm_finite(model->nq, q) || !mstmm_finite(model->nu, u)) return 0;
@@ -106,8 +112,7 @@ int mstmm_points_places(const void *record, real none, const real *const *rows,
     return 0;
 }
 
-int mstmm_points_poses(const void *record, real none, const real *const *rows,
-                       real *const *answers)
+int mstmm_points_poses(const void *record, real none, const real *const *rows, real *const *answers)
 {
     const mstmm_points *points = record;
     real shown[MSTMM_PROBE_NUMBERS];
@@ -164,8 +169,9 @@ static int gains_of(mstmm_state *state, const mstmm_probe *probe, const int *way
     real shown[MSTMM_PROBE_NUMBERS];
     for (int k = first; k >= 0; k--) {
         const int parent = state->model->bodies[way[k]].parent;
-        const int code = mstmm_at_forward(
-            state, way[k], mstmm_block(state->model, state->workspace, parent) + MSTMM_BLOCK_MOTION);
+        const int code = mstmm_at_forward(state, way[k],
+                                          mstmm_block(state->model, state->workspace, parent) +
+                                              MSTMM_BLOCK_MOTION);
         if (code) return code;
     }
     mstmm_point_shown(state, probe, mstmm_zeros, shown);
@@ -197,8 +203,7 @@ static void add_brackets(const mstmm_points *points, const real *u, real *to)
     const int64_t nu = points->at.model->nu;
     const real *jacobian = points->rows, *x = jacobian + 3 * nu, *y = x + nu, *z = y + nu;
     real w[3] = {0};
-    for (int64_t j = 0; j < nu; j++)
-        w[0] += x[j] * u[j], w[1] += y[j] * u[j], w[2] += z[j] * u[j];
+    for (int64_t j = 0; j < nu; j++) w[0] += x[j] * u[j], w[1] += y[j] * u[j], w[2] += z[j] * u[j];
     for (int64_t j = 0; j < nu; j++) {
         to[3 * nu + j] += (w[1] * z[j] - w[2] * y[j]) / 2;
         to[4 * nu + j] += (w[2] * x[j] - w[0] * z[j]) / 2;
@@ -207,8 +212,7 @@ static void add_brackets(const mstmm_points *points, const real *u, real *to)
     for (int n = 0; n < points->n_brackets; n++) {
         const mstmm_bracket *one = &points->brackets[n];
         const real half = u[one->by] * one->value / 2;
-        for (int k = 0; k < 6; k++)
-            to[k * nu + one->column] -= half * jacobian[k * nu + one->row];
+        for (int k = 0; k < 6; k++) to[k * nu + one->column] -= half * jacobian[k * nu + one->row];
     }
 }
 

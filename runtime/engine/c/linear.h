@@ -26,7 +26,7 @@ typedef struct {
 typedef struct {
     mstmm_linear_code code;
     const real *efforts; /* nu zeros */
-    real *found;         /* mstmm_linear_numbers */
+    real *found; /* mstmm_linear_numbers */
 } mstmm_linear_alone;
 
 /* Numbers that it finds: udot (nu), M, C, K, G (n x n each), r_t (n), qdot (nq). */

@@ -149,7 +149,7 @@ MSTMM_WIDE static void solve_tile(int n, const real *restrict factors, real *res
 /* As many columns as a tile holds, laid out there or taken back from it, from column `first` of
  * *all on; returns where the next ones begin. */
 static const columns *copy_tile(int n, const columns *all, const columns *end, int *first, int back,
-                            real *tile)
+                                real *tile)
 {
     for (int used = 0; all < end && used < TILE;) {
         const int left = all->width - *first, room = TILE - used;
@@ -205,10 +205,12 @@ int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real 
 {
     const int n = code->n, width = 3 * n + 1;
     const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *r_t = K + 2 * n * n;
-    const columns all[] = {{K, n, width, slopes}, {C, n, width, slopes + n},
-                           {NULL, n, width, slopes + 2 * n}, {r_t, 1, width, slopes + 3 * n}};
-    return mstmm_linear_at(code, t, q, u, efforts, found)
-           || divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n * width, slopes);
+    const columns all[] = {{K, n, width, slopes},
+                           {C, n, width, slopes + n},
+                           {NULL, n, width, slopes + 2 * n},
+                           {r_t, 1, width, slopes + 3 * n}};
+    return mstmm_linear_at(code, t, q, u, efforts, found) ||
+           divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n * width, slopes);
 }
 
 int mstmm_linear_derivatives(const void *record, real t, const real *const *rows,
@@ -218,10 +220,12 @@ int mstmm_linear_derivatives(const void *record, real t, const real *const *rows
     const mstmm_linear_code *code = &alone->code;
     const int n = code->n, nu = code->fused->nu, square = n * n;
     const real *M = alone->found + nu, *C = M + square, *K = C + square, *G = K + square;
-    const columns all[] = {{K, n, n, answers[1]}, {C, n, n, answers[2]}, {NULL, n, n, answers[3]},
+    const columns all[] = {{K, n, n, answers[1]},
+                           {C, n, n, answers[2]},
+                           {NULL, n, n, answers[3]},
                            {G + square, 1, 1, answers[4]}};
-    int failed = mstmm_linear_at(code, t, rows[0], rows[1], alone->efforts, alone->found)
-                 || divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n, answers[4]);
+    int failed = mstmm_linear_at(code, t, rows[0], rows[1], alone->efforts, alone->found) ||
+                 divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n, answers[4]);
     for (int k = 1; !failed && k < 4; k++) failed = !mstmm_finite(square, answers[k]);
     if (failed) return 1;
     memcpy(answers[0], alone->found, (size_t)nu * sizeof(real));

@@ -39,8 +39,14 @@ static int continues(const mstmm_model *model, const mstmm_branch *run, const in
 static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **numbers, int i)
 {
     const mstmm_body *body = &model->bodies[i];
-    *run = (mstmm_branch){.first = i, .parent = body->parent, .q = body->q, .u = body->u,
-                       .nq = body->nq, .nu = body->nu, .place = -1, .parent_place = -1};
+    *run = (mstmm_branch){.first = i,
+                          .parent = body->parent,
+                          .q = body->q,
+                          .u = body->u,
+                          .nq = body->nq,
+                          .nu = body->nu,
+                          .place = -1,
+                          .parent_place = -1};
     if (!body->kernels->link_condense) return;
     run->numbers = numbers + i;
     run->angles = body->kernels->link_angles;
@@ -134,8 +140,13 @@ static const real *parent_numbers(const mstmm_state *state, const mstmm_branch *
 MSTMM_INLINE mstmm_link_at link_at(mstmm_state *state, const mstmm_branch *run, int k)
 {
     return (mstmm_link_at){
-        .state = state, .index = run->first + k, .nu = run->nu, .turn = run->turn,
-        .forward = run->forward, .condense = run->condense, .recover = run->recover,
+        .state = state,
+        .index = run->first + k,
+        .nu = run->nu,
+        .turn = run->turn,
+        .forward = run->forward,
+        .condense = run->condense,
+        .recover = run->recover,
         .link = state->workspace + run->place + k * link_size(run),
         .q = state->q + run->q + (int64_t)k * run->nq,
         .u = state->u + run->u + (int64_t)k * run->nu,
@@ -241,8 +252,8 @@ static int condense_links(mstmm_state *state, const mstmm_branch *run, carried_t
     const int last = run->first + run->count - 1;
     mstmm_link_at at = link_at(state, run, run->count - 1);
     at.inner = carried->handed ? carried->handed
-               : run->open ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
-                           : mstmm_zeros;
+               : run->open     ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
+                               : mstmm_zeros;
     for (int k = run->count - 1; k >= 0; k--, at.link -= size, at.index--) {
         at.numbers = run->numbers[k];
         at.outer = carried->numbers[carried->next];

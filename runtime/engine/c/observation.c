@@ -8,11 +8,15 @@
 #include "scene.h"
 #include "sweep_steps.h"
 
-static mstmm_state observed_state(const mstmm_model *model, real *workspace, real t, const real *memory,
-                            mstmm_failure *failure)
+static mstmm_state observed_state(const mstmm_model *model, real *workspace, real t,
+                                  const real *memory, mstmm_failure *failure)
 {
-    return (mstmm_state){.model = model, .workspace = workspace, .t = t, .memory = memory,
-                         .observed = 1, .failure = failure};
+    return (mstmm_state){.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .memory = memory,
+                         .observed = 1,
+                         .failure = failure};
 }
 
 /* State as `mstmm_accelerations_kept` left it: coordinates filled, hinges known, poses computed. */
@@ -66,8 +70,8 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
                               .delta = block + MSTMM_BLOCK_DELTA, .A = block + MSTMM_BLOCK_A,
                               .f = load, .force = force, .moment = moment);
         if (wanted->loads) {
-            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12, .f = load,
-                                   .moment = moment);
+            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12,
+                                   .f = load, .moment = moment);
             memcpy(wanted->loads + 6 * (size_t)i, force, sizeof force);
             memcpy(wanted->loads + 6 * (size_t)i + 3, moment, sizeof moment);
         }
@@ -185,14 +189,13 @@ int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n,
 }
 
 int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
-                             const real *q, const real *u, const real *memory,
-                             const real *efforts, real *qdot, real *udot, mstmm_failure *failure,
-                             int64_t *failed_at)
+                             const real *q, const real *u, const real *memory, const real *efforts,
+                             real *qdot, real *udot, mstmm_failure *failure, int64_t *failed_at)
 {
     for (int64_t k = 0; k < n; k++) {
         *failed_at = k;
-        int code = mstmm_accelerations(model, workspace, t[k], q + k * model->nq,
-                                       u + k * model->nu, memory + k * model->n_memory,
+        int code = mstmm_accelerations(model, workspace, t[k], q + k * model->nq, u + k * model->nu,
+                                       memory + k * model->n_memory,
                                        efforts ? efforts + k * model->nu : NULL,
                                        qdot + k * model->nq, udot + k * model->nu, NULL, failure);
         if (code) return code;
@@ -203,7 +206,8 @@ int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t 
 /* --- states of a run --- */
 
 /* Poses and velocities of all bodies of a state with speeds u, to be read from `state`. */
-static int motion_state(mstmm_scene_run *run, real t, const real *y, const real *u, mstmm_state *state)
+static int motion_state(mstmm_scene_run *run, real t, const real *y, const real *u,
+                        mstmm_state *state)
 {
     *state = observed_state(run->model, run->workspace, t, run->memory, &run->failure);
     state->q = y;

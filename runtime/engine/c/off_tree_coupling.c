@@ -31,11 +31,10 @@ void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own,
         const mstmm_coupled_row *one = &at->couplings->rows[k];
         const real softness = one->row < 0 ? 0 : model->rows[one->row].softness;
         if (softness > 0)
-            rows[k] = own[model->bodies[one->frame].u + one->direction]
-                      - softness * mstmm_row_numbers(model, workspace, one->row)[MSTMM_ROW_X];
+            rows[k] = own[model->bodies[one->frame].u + one->direction] -
+                      softness * mstmm_row_numbers(model, workspace, one->row)[MSTMM_ROW_X];
         else
-            rows[k] = workspace[row_place(model, one)]
-                      - (one->speed < 0 ? 0 : own[one->speed]);
+            rows[k] = workspace[row_place(model, one)] - (one->speed < 0 ? 0 : own[one->speed]);
     }
 }
 
@@ -44,8 +43,7 @@ void mstmm_keep_multipliers(const mstmm_model *model, real *workspace)
     for (int r = 0; r < model->n_rows; r++) mstmm_row_numbers(model, workspace, r)[MSTMM_ROW_X] = 0;
 }
 
-void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
-                   real *required)
+void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own, real *required)
 {
     for (int k = 0; at->model->looped && k < at->couplings->n_rows; k++) {
         const mstmm_coupled_row *one = &at->couplings->rows[k];
@@ -57,16 +55,10 @@ void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *o
 /* --- unknowns --- */
 
 /* Number of unknown changes of loads and efforts; rows of closing hinges follow them. */
-static int n_changes(const mstmm_tangent *at)
-{
-    return at->n_coupled - at->couplings->n_rows;
-}
+static int n_changes(const mstmm_tangent *at) { return at->n_coupled - at->couplings->n_rows; }
 
 /* Entries of a list that are of pass or group k (-1: none). */
-static int first_in_list(const int *firsts, int k)
-{
-    return k < 0 ? 0 : firsts[k];
-}
+static int first_in_list(const int *firsts, int k) { return k < 0 ? 0 : firsts[k]; }
 
 static int end_of_list(const int *firsts, int k)
 {
@@ -111,7 +103,8 @@ static int direction_changes(mstmm_tangent *at, const mstmm_parts *parts, int pa
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
     mstmm_set_own_apart(at, parts->d_a, parts->answer);
     mstmm_keep_multipliers(at->model, slope.workspace);
-    for (int s = first_in_list(all->first_seed, pass); s < end_of_list(all->first_seed, pass); s++) {
+    for (int s = first_in_list(all->first_seed, pass); s < end_of_list(all->first_seed, pass);
+         s++) {
         const int row = multiplier(at, all->seed[s]);
         if (row >= 0 && is_unknown(at, all->seed[s]))
             mstmm_row_numbers(at->model, slope.workspace, row)[MSTMM_ROW_X] = 1;
@@ -194,13 +187,16 @@ static void set_efforts(const mstmm_tangent *at, int pass, real value, real *col
 
 /* Solution x for r with known increments (NULL: none), and for a unit of each change of a pass (-1:
  * none). */
-static int solve_tree(mstmm_tangent *at, const real *r, const mstmm_known *known, int pass,
-                       real *x)
+static int solve_tree(mstmm_tangent *at, const real *r, const mstmm_known *known, int pass, real *x)
 {
     const mstmm_parts parts = tangent_parts(at);
     const mstmm_couplings *all = at->couplings;
-    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
-                           .kappa = at->kappa, .kept = at->kept};
+    mstmm_tangents step = {.numbers = at->numbers,
+                           .rate = at->rate,
+                           .s = at->s,
+                           .sq = at->sq,
+                           .kappa = at->kappa,
+                           .kept = at->kept};
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
@@ -220,8 +216,7 @@ static int solve_tree(mstmm_tangent *at, const real *r, const mstmm_known *known
     /* Hinges that close loops are no part of the tree. */
     for (int i = 0; i < all->n_rows; i++)
         if (all->rows[i].speed >= 0) x[all->rows[i].speed] = 0;
-    const int code =
-        known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
+    const int code = known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
     set_efforts(at, pass, 0, parts.column);
     return code;
 }

@@ -47,8 +47,7 @@ static int next_in_chain(const mstmm_model *model, int index)
 /* Numbers of a body: two matrices, scales, its deviation, its load. */
 static real *chain_numbers(const mstmm_state *state, int index)
 {
-    return state->workspace + state->model->product->place +
-           (size_t)MSTMM_PRODUCT_PER_BODY * index;
+    return state->workspace + state->model->product->place + (size_t)MSTMM_PRODUCT_PER_BODY * index;
 }
 
 /* Accelerations of all speeds, behind all bodies. */
@@ -232,9 +231,9 @@ static void body_matrix(const mstmm_state *state, int index, const real *applied
     real mass[1], r_io[3], r_ic[3], inertia[6], omega[3], force[3], moment[3];
     mstmm_frames_classical_body(.A = block + MSTMM_BLOCK_A, .p = body->body_p,
                                 .motion = alone ? mstmm_zeros : block + MSTMM_BLOCK_MOTION,
-                                .load = applied,
-                                .ro_n = output, .M = mass, .r_IO = r_io, .r_IC = r_ic,
-                                .J_I = inertia, .omega = omega, .f_C = force, .m_C = moment);
+                                .load = applied, .ro_n = output, .M = mass, .r_IO = r_io,
+                                .r_IC = r_ic, .J_I = inertia, .omega = omega, .f_C = force,
+                                .m_C = moment);
     mstmm_classical_body_transfer(.M = mass, .r_IO = r_io, .r_IC = r_ic, .J_I = inertia,
                                   .omega = omega, .f_C = force, .m_C = moment, .U = store + BODY,
                                   .F_scale = store + SCALE);
@@ -254,24 +253,23 @@ static int hinge_matrix(const mstmm_state *state, int index, int alone, real *st
         if (next >= 0 && !alone) tau[0] = *hinge_tau(state, next);
         mstmm_frames_turned(.A = parent + MSTMM_BLOCK_A,
                             .b = alone ? mstmm_zeros : parent + MSTMM_BLOCK_MOTION, .b_0 = omega);
-        return mstmm_classical_pin_transfer(
-            .U = store + BODY, .F_scale = store + SCALE, .a = axis, .u = state->u + body->u,
-            .omega_I = omega, .a_n = next_axis, .tau_n = tau, .U_h = store + HINGE,
-            .margin = &margin);
+        return mstmm_classical_pin_transfer(.U = store + BODY, .F_scale = store + SCALE, .a = axis,
+                                            .u = state->u + body->u, .omega_I = omega,
+                                            .a_n = next_axis, .tau_n = tau, .U_h = store + HINGE,
+                                            .margin = &margin);
     case MSTMM_PRODUCT_BALL:
         if (next >= 0 && !alone) hinge_efforts(state, next, NULL, tau);
         return mstmm_classical_ball_transfer(.U = store + BODY, .F_scale = store + SCALE,
-                                             .tau_n = tau, .U_h = store + HINGE,
-                                             .margin = &margin);
+                                             .tau_n = tau, .U_h = store + HINGE, .margin = &margin);
     default:
         hinge_offset(state, index, offset);
         if (next >= 0) {
             hinge_offset(state, next, next_offset);
             if (!alone) hinge_efforts(state, next, tau, tau + 3);
         }
-        return mstmm_classical_acceleration_transfer(
-            .U = store + BODY, .F_scale = store + SCALE, .d = offset, .d_n = next_offset,
-            .tau_n = tau, .U_h = store + HINGE, .margin = &margin);
+        return mstmm_classical_acceleration_transfer(.U = store + BODY, .F_scale = store + SCALE,
+                                                     .d = offset, .d_n = next_offset, .tau_n = tau,
+                                                     .U_h = store + HINGE, .margin = &margin);
     }
 }
 
@@ -303,8 +301,7 @@ static int multiply_chain(mstmm_state *state, int which, real *overall)
     real step[N * N], load[6];
     memset(overall, 0, N * N * sizeof(real));
     for (int i = 0; i < N; i++) overall[(N + 1) * i] = 1;
-    for (int i = next_in_chain(state->model, -1); i >= 0;
-         i = next_in_chain(state->model, i)) {
+    for (int i = next_in_chain(state->model, -1); i >= 0; i = next_in_chain(state->model, i)) {
         real *store = chain_numbers(state, i);
         chain_load(state, i, which, load);
         body_matrix(state, i, load, which >= 0, store);
@@ -335,8 +332,7 @@ static int solve_chain(mstmm_state *state, int which)
         mstmm_frames_state_deviation(.A = block + MSTMM_BLOCK_A,
                                      .motion = alone ? mstmm_zeros : block + MSTMM_BLOCK_MOTION,
                                      .z = next, .delta = store + STATE);
-        mstmm_generic_project(body->nu, .Rc = block + MSTMM_BLOCK_R,
-                              .r = block + MSTMM_BLOCK_SHIFT,
+        mstmm_generic_project(body->nu, .Rc = block + MSTMM_BLOCK_R, .r = block + MSTMM_BLOCK_SHIFT,
                               .H = mstmm_of_speeds(block, body->nu, MSTMM_SPEED_H),
                               .delta = store + STATE, .delta_I = parent,
                               .udot = chain_accelerations(state) + body->u);
@@ -431,8 +427,10 @@ static int solve_closed_chain(mstmm_state *state, real *open)
     real *x = chain_multipliers(state), *system = x + rows;
     int code = 0, last = 0;
     for (int i = 0; i < model->n_bodies && !code; i++) {
-        if (model->looped[i].closure) add_efforts(state, last = i);
-        else code = mstmm_at_hinge_motion(state, i); /* overwritten by the elimination */
+        if (model->looped[i].closure)
+            add_efforts(state, last = i);
+        else
+            code = mstmm_at_hinge_motion(state, i); /* overwritten by the elimination */
     }
     for (int which = -1; which < rows && !code; which++) {
         code = solve_chain(state, which < 0 ? ACTING : which);

@@ -31,7 +31,8 @@ static void scaled_entries(const mstmm_state *state, const mstmm_choice *one, re
         scale[i] = isfinite(own) && mobility > 0 ? 1 / sqrt(mobility) : 0;
         found[i][i] = isfinite(own) ? own * scale[i] * scale[i] : 0;
         for (int j = 0; j < i; j++)
-            found[i][j] = found[j][i] = loops[one->pairs[i * (i - 1) / 2 + j]] * scale[i] * scale[j];
+            found[i][j] = found[j][i] =
+                loops[one->pairs[i * (i - 1) / 2 + j]] * scale[i] * scale[j];
     }
 }
 
@@ -121,8 +122,13 @@ int mstmm_rests(const mstmm_state *state, const mstmm_loop_row *row)
 int mstmm_choose_rows(const mstmm_model *model, real *workspace, real t, const real *q,
                       real *memory, int *changed, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q,
-                         .memory = memory, .level = MSTMM_SLIP, .failure = failure,
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .q = q,
+                         .memory = memory,
+                         .level = MSTMM_SLIP,
+                         .failure = failure,
                          .chosen = memory};
     *changed = 0;
     if (!model->n_choices) return 0;

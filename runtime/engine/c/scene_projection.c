@@ -58,8 +58,8 @@ static int compiled_slips(void *context)
     mstmm_scene_run *run = at->run;
     const mstmm_fused *fused = run->fused;
     real *du = run->fused_numbers + fused->nu, *u = at->y + fused->nq;
-    const int code = fused->slips(run->fused_p, &at->t, at->y, u, run->memory,
-                                  run->fused_numbers, du, &run->strain);
+    const int code = fused->slips(run->fused_p, &at->t, at->y, u, run->memory, run->fused_numbers,
+                                  du, &run->strain);
     if (code) return mstmm_fused_failure(run, fused, code);
     for (int i = 0; i < fused->nu; i++) u[i] += du[i];
     return 0;
@@ -70,8 +70,8 @@ static int close_loops(mstmm_scene_run *run, double t, double *y)
     const mstmm_model *model = run->model;
     if (!run->fused) {
         const int code = mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
-                                           run->n_quaternions, run->quaternions,
-                                           run->on_positions, &run->failure);
+                                           run->n_quaternions, run->quaternions, run->on_positions,
+                                           &run->failure);
         run->strain = mstmm_strain(model, run->workspace);
         return code;
     }
@@ -126,8 +126,8 @@ int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const do
     const mstmm_fused *fused = run->fused;
     real *speeds = run->speeds, strain;
     if (!speeds || !(run->memory[model->strained] > 0)) return 0;
-    const int code = fused ? fused->slips(run->fused_p, &t, y, *u, run->memory,
-                                          run->fused_numbers, speeds, &strain)
+    const int code = fused ? fused->slips(run->fused_p, &t, y, *u, run->memory, run->fused_numbers,
+                                          speeds, &strain)
                            : mstmm_correction(model, run->workspace, MSTMM_SLIP, 0, t, y, *u,
                                               run->memory, speeds, NULL, &run->failure);
     if (code) return fused ? mstmm_fused_failure(run, fused, code) : code;

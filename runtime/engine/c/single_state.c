@@ -22,9 +22,9 @@ int mstmm_alone_accelerations(const void *record, real t, const real *const *row
     if (!is_finite_state(model, t, rows)) return 1;
     if (alone->fused) {
         mstmm_renew_inputs(&alone->live, t, alone->memory, alone->p);
-        failed = alone->fused->accelerations(alone->p, &t, q, u, alone->memory,
-                                             efforts ? efforts : alone->none, alone->qdot,
-                                             answers[0]);
+        failed =
+            alone->fused->accelerations(alone->p, &t, q, u, alone->memory,
+                                        efforts ? efforts : alone->none, alone->qdot, answers[0]);
     } else {
         failed = mstmm_accelerations(model, alone->workspace, t, q, u, alone->memory, efforts,
                                      alone->qdot, answers[0], NULL, &failure);
@@ -87,8 +87,7 @@ int mstmm_alone_energy(const void *record, real t, const real *const *rows, real
     return failed;
 }
 
-int mstmm_alone_momentum(const void *record, real t, const real *const *rows,
-                         real *const *answers)
+int mstmm_alone_momentum(const void *record, real t, const real *const *rows, real *const *answers)
 {
     real sums[MSTMM_SUM_NUMBERS];
     const int failed = sum_scene(record, t, rows, sums);
@@ -122,8 +121,13 @@ int mstmm_alone_moved(const void *record, real dt, const real *const *rows, real
         const real size = quaternion_length(four);
         for (int i = 0; i < 4; i++) four[i] /= size;
     }
-    mstmm_state state = {.model = model, .workspace = alone->workspace, .memory = alone->memory,
-                         .q = q, .u = rows[1], .qdot = rate, .failure = &failure};
+    mstmm_state state = {.model = model,
+                         .workspace = alone->workspace,
+                         .memory = alone->memory,
+                         .q = q,
+                         .u = rows[1],
+                         .qdot = rate,
+                         .failure = &failure};
     for (int i = 0; i < model->n_bodies; i++)
         if (mstmm_at_hinge_motion(&state, i)) return 1;
     for (int k = 0; k < alone->n_quaternions; k++) {

@@ -1,4 +1,4 @@
-/* Equations of a step of implicit methods: residual, its derivative, and the factored tangent, along
+/* Equations of a step of implicit methods: residual, its derivative, and the factored tangent on
  * the tree and off it; see tangent.h. */
 #include "across.h"
 #include "sweep_steps.h"
@@ -58,8 +58,8 @@ int mstmm_residual_is_at(const mstmm_tangent *at, real t, const real *q, const r
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
-    return at->known && !(at->t < t) && !(at->t > t) && equal_numbers(parts.q, q, model->nq)
-           && equal_numbers(parts.u, u, model->nu) && (!a || equal_numbers(parts.a, a, model->nu));
+    return at->known && !(at->t < t) && !(at->t > t) && equal_numbers(parts.q, q, model->nq) &&
+           equal_numbers(parts.u, u, model->nu) && (!a || equal_numbers(parts.a, a, model->nu));
 }
 
 int mstmm_residual_slope(mstmm_tangent *at, real d_t, const real *d_q, const real *d_u,
@@ -97,8 +97,13 @@ static int run_tangent(mstmm_tangent *at, int (*run)(mstmm_state *), int *negati
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
-    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
-                           .kappa = at->kappa, .negative = negative, .kept = kept};
+    mstmm_tangents step = {.numbers = at->numbers,
+                           .rate = at->rate,
+                           .s = at->s,
+                           .sq = at->sq,
+                           .kappa = at->kappa,
+                           .negative = negative,
+                           .kept = kept};
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
@@ -124,8 +129,8 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
     int negative = 0;
     /* If loads need poses, all bodies are initialised before the first elimination. */
     const int kept = at->keeps || at->model->needs_pose || at->model->product;
-    const int code = run_tangent(at, mstmm_run_tangent,
-                                 at->n_coupled || at->counts ? &negative : NULL, kept);
+    const int code =
+        run_tangent(at, mstmm_run_tangent, at->n_coupled || at->counts ? &negative : NULL, kept);
     return code || !at->n_coupled ? code : mstmm_across_factor(at, negative);
 }
 
@@ -134,8 +139,11 @@ int mstmm_tangent_factor(mstmm_tangent *at, real rate, real s, real sq, real kap
 /* Unknown are accelerations: of the increments they are what carries the others along. */
 static mstmm_tangents laws_steps(const mstmm_tangent *at)
 {
-    return (mstmm_tangents){.numbers = at->numbers, .rate = at->rate / at->s, .s = 1,
-                            .sq = at->s * at->sq, .laws_alone = 1};
+    return (mstmm_tangents){.numbers = at->numbers,
+                            .rate = at->rate / at->s,
+                            .s = 1,
+                            .sq = at->s * at->sq,
+                            .laws_alone = 1};
 }
 
 int mstmm_laws_factor(mstmm_tangent *at, real rate, real s, real sq, real kappa)

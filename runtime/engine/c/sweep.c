@@ -67,7 +67,8 @@ int mstmm_hook_expression_slopes(mstmm_state *state)
     const real *inputs[] = {&state->t, state->q, state->u, mstmm_input_numbers(state),
                             &slope->t, slope->q, slope->u};
     real *outputs[] = {mstmm_values(slope)};
-    const int code = mstmm_tape_run(state->model->value_slopes, inputs, mstmm_slots(slope), outputs);
+    const int code =
+        mstmm_tape_run(state->model->value_slopes, inputs, mstmm_slots(slope), outputs);
     return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;
 }
 
@@ -75,7 +76,7 @@ int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *tape, const r
                              const real *d_length, real *d_value)
 {
     mstmm_state *slope = state->slope;
-    const real *inputs[] = {&state->t, state->q, state->u, length, mstmm_input_numbers(state),
+    const real *inputs[] = {&state->t, state->q, state->u, length,  mstmm_input_numbers(state),
                             &slope->t, slope->q, slope->u, d_length};
     real *outputs[] = {d_value};
     return mstmm_tape_run(tape, inputs, mstmm_slots(slope), outputs);

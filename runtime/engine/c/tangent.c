@@ -41,7 +41,8 @@ int64_t mstmm_tangent_lay(mstmm_model *model)
     for (int i = 0; i < model->n_bodies; i++) {
         mstmm_body *body = &model->bodies[i];
         const int known = body->kernels->slope_tape || body->kernels->hinge_slope;
-        if (!known || !body->kernels->bias_load_slope || !body->kernels->load_by_motion) return -1 - i;
+        if (!known || !body->kernels->bias_load_slope || !body->kernels->load_by_motion)
+            return -1 - i;
         body->tangent = place;
         place += MSTMM_TANGENT_NUMBERS(body->nu, body->nq);
         body->place = 0;
@@ -101,7 +102,8 @@ int64_t mstmm_tangent_pivots(const mstmm_tangent *at, int *sizes, real *pivots)
         sizes[2 * i + 1] = speeds;
         for (int part = 0; part < 2; part++) {
             const int count = sizes[2 * i + part] * sizes[2 * i + part];
-            if (pivots) memcpy(pivots + place, at->numbers + from[part], sizeof(real) * (size_t)count);
+            if (pivots)
+                memcpy(pivots + place, at->numbers + from[part], sizeof(real) * (size_t)count);
             place += count;
         }
     }
@@ -153,7 +155,8 @@ int mstmm_tangent_rates(mstmm_tangent *at, const real *q, const real *u, real *d
 
 /* dq of a hinge whose rates go by its coordinates, with laws alone: what it changes the rates by is
  * taken from itself once. */
-static int iterate_coordinates(mstmm_state *state, const mstmm_tangent *at, const mstmm_body *body, int i)
+static int iterate_coordinates(mstmm_state *state, const mstmm_tangent *at, const mstmm_body *body,
+                               int i)
 {
     real *d_q = mstmm_aimed(state->slope->q) + body->q, *dq = state->tangents->change + body->q;
     int code = 0;
@@ -169,8 +172,13 @@ int mstmm_tangent_coordinates(mstmm_tangent *at, const real *du, const real *rho
 {
     const mstmm_model *model = at->model;
     const mstmm_parts parts = tangent_parts(at);
-    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq, .kappa = at->kappa,
-                           .rho = rho ? rho : parts.still, .change = dq};
+    mstmm_tangents step = {.numbers = at->numbers,
+                           .rate = at->rate,
+                           .s = at->s,
+                           .sq = at->sq,
+                           .kappa = at->kappa,
+                           .rho = rho ? rho : parts.still,
+                           .change = dq};
     mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;

@@ -18,10 +18,24 @@ static inline mstmm_parts cut_tangent_work(const mstmm_model *model, int64_t slo
 {
     mstmm_parts at = {.used = 0};
     const int64_t nq = model->nq, nu = model->nu;
-    const struct { real **to; int64_t count; } all[] = {
-        {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.required, nu}, {&at.qdot, nq},
-        {&at.d_q, nq}, {&at.d_u, nu}, {&at.d_a, nu}, {&at.d_qdot, nq}, {&at.answer, nu},
-        {&at.column, nu}, {&at.still, nq}, {&at.change, nq}, {&at.still_efforts, nu},
+    const struct {
+        real **to;
+        int64_t count;
+    } all[] = {
+        {&at.q, nq},
+        {&at.u, nu},
+        {&at.a, nu},
+        {&at.required, nu},
+        {&at.qdot, nq},
+        {&at.d_q, nq},
+        {&at.d_u, nu},
+        {&at.d_a, nu},
+        {&at.d_qdot, nq},
+        {&at.answer, nu},
+        {&at.column, nu},
+        {&at.still, nq},
+        {&at.change, nq},
+        {&at.still_efforts, nu},
         {&at.shadow, model->workspace + slots},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
@@ -39,10 +53,17 @@ static inline mstmm_parts tangent_parts(const mstmm_tangent *at)
 
 static inline mstmm_state tangent_state(mstmm_tangent *at, const mstmm_parts *parts)
 {
-    return (mstmm_state){.model = at->model, .workspace = at->workspace, .t = at->t, .q = parts->q,
-                         .u = parts->u, .memory = at->memory, .given = parts->a,
-                         .required = parts->required, .qdot = parts->qdot,
-                         .failure = &at->failure, .residual = 1};
+    return (mstmm_state){.model = at->model,
+                         .workspace = at->workspace,
+                         .t = at->t,
+                         .q = parts->q,
+                         .u = parts->u,
+                         .memory = at->memory,
+                         .given = parts->a,
+                         .required = parts->required,
+                         .qdot = parts->qdot,
+                         .failure = &at->failure,
+                         .residual = 1};
 }
 
 /* The state of the last residual: driven coordinates have been filled in. */

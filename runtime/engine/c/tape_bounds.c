@@ -47,7 +47,10 @@ static interval inverse(interval a)
     return (interval){1.0 / a.hi, 1.0 / a.lo};
 }
 
-static interval map_increasing(double (*f)(double), interval a) { return (interval){f(a.lo), f(a.hi)}; }
+static interval map_increasing(double (*f)(double), interval a)
+{
+    return (interval){f(a.lo), f(a.hi)};
+}
 static interval magnitude(interval a)
 {
     const double l = fabs(a.lo), h = fabs(a.hi);
@@ -64,13 +67,11 @@ static interval cosine(interval a)
 {
     if (!(a.hi - a.lo < 2.0 * PI)) return (interval){-1.0, 1.0};
     const double l = cos(a.lo), h = cos(a.hi);
-    return (interval){contains_turn(a, PI) ? -1.0 : fmin(l, h), contains_turn(a, 0.0) ? 1.0 : fmax(l, h)};
+    return (interval){contains_turn(a, PI) ? -1.0 : fmin(l, h),
+                      contains_turn(a, 0.0) ? 1.0 : fmax(l, h)};
 }
 
-static interval sine(interval a)
-{
-    return cosine((interval){a.lo - 0.5 * PI, a.hi - 0.5 * PI});
-}
+static interval sine(interval a) { return cosine((interval){a.lo - 0.5 * PI, a.hi - 0.5 * PI}); }
 
 static interval clip(interval a, double lo, double hi)
 {
@@ -129,11 +130,14 @@ static bounded power(bounded a, bounded b)
         const interval less = {pow(s.lo, n - 1.0), pow(s.hi, n - 1.0)};
         const interval value = up.lo <= up.hi ? up : (interval){up.hi, up.lo};
         interval slope = hull(point(less.lo), point(less.hi));
-        if (even && a.value.hi <= 0.0) slope = negative(slope);
-        else if (even && a.value.lo < 0.0) slope = hull(slope, negative(slope));
+        if (even && a.value.hi <= 0.0)
+            slope = negative(slope);
+        else if (even && a.value.lo < 0.0)
+            slope = hull(slope, negative(slope));
         return chain_rule(value, product(point(n), slope), a);
     }
-    const interval l = interval_logarithm(a.value), value = interval_exponential(product(b.value, l));
+    const interval l = interval_logarithm(a.value),
+                   value = interval_exponential(product(b.value, l));
     const interval part = product(b.value, product(a.slope, inverse(a.value)));
     const interval rate = sum(product(b.slope, l), part);
     return (bounded){value, product(value, rate)};
@@ -166,10 +170,7 @@ static bounded least(bounded a, bounded b)
                      hull(a.slope, b.slope)};
 }
 
-static bounded opposite(bounded a)
-{
-    return (bounded){negative(a.value), negative(a.slope)};
-}
+static bounded opposite(bounded a) { return (bounded){negative(a.value), negative(a.slope)}; }
 
 /* certainly 1, certainly 0, or undetermined */
 static bounded truth(int surely, int never)
@@ -209,11 +210,13 @@ static bounded apply_operation(int op, bounded a, bounded b, bounded c, int same
     case MSTMM_OP_ACOS:
         v = clip(x, -1.0, 1.0);
         return opposite(chain_rule(sum(map_increasing(asin, v), point(-0.5 * PI)),
-                                inverse(root(sum(one, negative(square(v))))), a));
+                                   inverse(root(sum(one, negative(square(v))))), a));
     case MSTMM_OP_ATAN: return chain_rule(map_increasing(atan, x), inverse(sum(one, square(x))), a);
     case MSTMM_OP_ATAN2: return angle(a, b);
-    case MSTMM_OP_SINH: return chain_rule(map_increasing(sinh, x), map_increasing(cosh, magnitude(x)), a);
-    case MSTMM_OP_COSH: return chain_rule(map_increasing(cosh, magnitude(x)), map_increasing(sinh, x), a);
+    case MSTMM_OP_SINH:
+        return chain_rule(map_increasing(sinh, x), map_increasing(cosh, magnitude(x)), a);
+    case MSTMM_OP_COSH:
+        return chain_rule(map_increasing(cosh, magnitude(x)), map_increasing(sinh, x), a);
     case MSTMM_OP_TANH:
         v = map_increasing(tanh, x);
         return chain_rule(v, sum(one, negative(square(v))), a);
@@ -249,8 +252,9 @@ void mstmm_tape_bounds(const mstmm_tape *tape, mstmm_bounds *slots, mstmm_bounds
         slots[slot] = (mstmm_bounds){tape->constants[i], tape->constants[i], 0.0, 0.0};
     const int *step = tape->instructions;
     for (int i = 0; i < tape->n_instructions; i++, step += MSTMM_TAPE_WIDTH)
-        slots[step[1]] = to_bounds(apply_operation(step[0], to_bounded(slots[step[2]]), to_bounded(slots[step[3]]),
-                                        to_bounded(slots[step[4]]), step[2] == step[3]));
+        slots[step[1]] = to_bounds(apply_operation(step[0], to_bounded(slots[step[2]]),
+                                                   to_bounded(slots[step[3]]),
+                                                   to_bounded(slots[step[4]]), step[2] == step[3]));
     const int *place = tape->outputs;
     for (int i = 0; i < tape->n_outputs; i++, place += MSTMM_TAPE_OUTPUT_WIDTH)
         outputs[place[1]] = slots[place[2]];

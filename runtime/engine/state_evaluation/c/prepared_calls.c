@@ -36,13 +36,14 @@ static const double *array_row(PyObject *given, npy_intp width)
 {
     if (!PyArray_CheckExact(given)) return NULL;
     PyArrayObject *array = (PyArrayObject *)given;
-    const int fits = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 1
-                     && PyArray_DIM(array, 0) == width && PyArray_ISCARRAY_RO(array);
+    const int fits = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 1 &&
+                     PyArray_DIM(array, 0) == width && PyArray_ISCARRAY_RO(array);
     return fits ? PyArray_DATA(array) : NULL;
 }
 
 /* Fills number and rows; 0 if the arguments are no such state. */
-static int read_arguments(const prepared *one, PyObject *const *given, double *number, const double **rows)
+static int read_arguments(const prepared *one, PyObject *const *given, double *number,
+                          const double **rows)
 {
     if (one->numbered) {
         if (!PyFloat_CheckExact(*given)) return 0;
@@ -75,10 +76,8 @@ static int run_function(const prepared *one, double number, const double **rows,
 {
     int failed;
     if (!one->released) return one->function(one->record, number, rows, answers);
-    Py_BEGIN_ALLOW_THREADS
-    failed = one->function(one->record, number, rows, answers);
-    Py_END_ALLOW_THREADS
-    return failed;
+    Py_BEGIN_ALLOW_THREADS failed = one->function(one->record, number, rows, answers);
+    Py_END_ALLOW_THREADS return failed;
 }
 
 static PyObject *return_arrays(const prepared *one, PyObject **arrays)
@@ -101,8 +100,7 @@ static PyObject *call_prepared(PyObject *self, PyObject *const *given, Py_ssize_
     PyObject *arrays[MOST_ANSWERS];
     if (!one) return NULL;
     if (count != one->numbered + one->n_rows)
-        return PyErr_Format(PyExc_TypeError, "expected %d arguments",
-                            one->numbered + one->n_rows);
+        return PyErr_Format(PyExc_TypeError, "expected %d arguments", one->numbered + one->n_rows);
     if (!read_arguments(one, given, &number, rows)) Py_RETURN_NONE;
     if (!make_arrays(one, arrays, answers)) return NULL;
     if (!run_function(one, number, rows, answers)) return return_arrays(one, arrays);
@@ -163,7 +161,8 @@ static PyObject *prepare(PyObject *module, PyObject *given)
     one->function = (called *)function;
     one->record = (const void *)record;
     one->numbered = numbered, one->optional = optional, one->released = released;
-    PyObject *self = fill_prepared(one, widths, shapes) ? PyCapsule_New(one, NULL, free_prepared) : NULL;
+    PyObject *self =
+        fill_prepared(one, widths, shapes) ? PyCapsule_New(one, NULL, free_prepared) : NULL;
     if (!self) {
         PyMem_Free(one);
         return NULL;
@@ -179,8 +178,8 @@ static PyMethodDef methods[] = {
      "prepare(function, record, widths, shapes, numbered, optional, released, kept): a call."},
     {NULL, NULL, 0, NULL}};
 
-static struct PyModuleDef module_def = {PyModuleDef_HEAD_INIT, "_prepared", NULL, -1, methods,
-                                        NULL, NULL, NULL, NULL};
+static struct PyModuleDef module_def = {
+    PyModuleDef_HEAD_INIT, "_prepared", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__prepared(void)
 {
