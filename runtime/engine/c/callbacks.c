@@ -2,11 +2,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "bounce.h"
-#include "control.h"
+#include "impact.h"
+#include "controllers.h"
 #include "event_bounds.h"
 #include "kernel_calls.h"
-#include "loops.h"
+#include "loop_closure.h"
 #include "scene.h"
 
 /* From so many times the strain that is near a singular pose on, what rounding makes of the rows is

@@ -4,7 +4,7 @@
 #ifndef MSTMM_COMPLEX_LANES_HEADER
 #define MSTMM_COMPLEX_LANES_HEADER
 
-#include "response.h"
+#include "harmonic_response.h"
 
 typedef double mstmm_lanes __attribute__((vector_size(8 * MSTMM_LANES)));
 typedef int64_t mstmm_bits __attribute__((vector_size(8 * MSTMM_LANES)));

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "control.h"
+#include "controllers.h"
 
 static const real SAME = 1e-9; /* of a sample time: a time so near to a sample is the sample */
 

@@ -1,5 +1,5 @@
 /* Couplings: rows between coordinates of hinges, whose numbers one tape gives; see sweep.h. */
-#include "loops.h"
+#include "loop_closure.h"
 #include "sweep_steps.h"
 
 static real *loop_numbers(const mstmm_state *state)

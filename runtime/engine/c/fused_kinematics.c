@@ -1,5 +1,5 @@
-/* Points by the code of a scene; see points_compiled.h. */
-#include "points_compiled.h"
+/* Points by the code of a scene; see fused_kinematics.h. */
+#include "fused_kinematics.h"
 
 #include <string.h>
 

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "compiled.h"
-#include "loops.h"
+#include "fused_rhs.h"
+#include "loop_closure.h"
 
 /* Results for closed loops: a change of the coordinates or speeds, and gaps. */
 static int64_t closing_size(const mstmm_fused *one)

@@ -1,5 +1,5 @@
-/* Harmonic response; see response.h. */
-#include "response.h"
+/* Harmonic response; see harmonic_response.h. */
+#include "harmonic_response.h"
 
 #include <string.h>
 

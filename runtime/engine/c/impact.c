@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "bounce.h"
+#include "impact.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
 

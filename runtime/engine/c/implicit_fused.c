@@ -2,7 +2,7 @@
  * looped engine is used, which names the cause or needs no such guard. */
 #include <string.h>
 
-#include "compiled.h"
+#include "fused_rhs.h"
 
 #define CODE(run) ((run)->implicit_code.fused)
 

@@ -1,7 +1,7 @@
 /* Interface of a scene to implicit methods: residual and factored tangent. */
 #include <string.h>
 
-#include "loops.h"
+#include "loop_closure.h"
 #include "scene.h"
 #include "sweep_steps.h"
 

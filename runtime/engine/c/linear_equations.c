@@ -1,5 +1,5 @@
-/* The linear equations of a scene about a state; see linear.h. */
-#include "linear.h"
+/* The linear equations of a scene about a state; see linear_equations.h. */
+#include "linear_equations.h"
 
 #include "is_finite.h"
 #include "four_lanes.h"

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "loops.h"
+#include "loop_closure.h"
 #include "sweep.h"
 #include "sweep_steps.h"
 

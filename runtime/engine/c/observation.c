@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "kernel_calls.h"
-#include "loops.h"
+#include "loop_closure.h"
 #include "scene.h"
 #include "sweep_steps.h"
 

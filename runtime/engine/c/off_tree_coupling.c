@@ -1,6 +1,6 @@
 /* Loads and efforts that couple distant bodies, and closing hinges, in addition to the tangent's
- * elimination along the tree; see across.h. */
-#include "across.h"
+ * elimination along the tree; see off_tree_coupling.h. */
+#include "off_tree_coupling.h"
 
 #include "sweep_steps.h"
 

@@ -106,7 +106,7 @@ typedef struct {
     real *later; /* nq + nu: scratch; NULL where it reads no velocities of probes */
     int closes; /* events read states inside a step, whose loops are closed first */
     int n_controllers;
-    const struct mstmm_controller *controllers; /* see control.h */
+    const struct mstmm_controller *controllers; /* see controllers.h */
     /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
     const mstmm_fused *fused, *fused_lanes;
     real *fused_p;

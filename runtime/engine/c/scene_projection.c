@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "compiled.h"
-#include "loops.h"
+#include "fused_rhs.h"
+#include "loop_closure.h"
 
 /* Maximum number of choices of rows at the end of a step. */
 #define CHOICES 3

@@ -1,5 +1,5 @@
-/* Calls on single states; see alone.h. */
-#include "alone.h"
+/* Calls on single states; see single_state.h. */
+#include "single_state.h"
 
 #include <string.h>
 

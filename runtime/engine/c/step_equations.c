@@ -1,6 +1,6 @@
 /* Equations of a step of implicit methods: residual, its derivative, and the factored tangent on
  * the tree and off it; see tangent.h. */
-#include "across.h"
+#include "off_tree_coupling.h"
 #include "sweep_steps.h"
 
 /* --- residual --- */

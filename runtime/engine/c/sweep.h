@@ -411,7 +411,7 @@ typedef struct mstmm_state {
     int hinges_known; /* the motion of hinges is known */
     int level; /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
     real give; /* see mstmm_correction */
-    const struct mstmm_strike *strike; /* see bounce.h; NULL: none */
+    const struct mstmm_strike *strike; /* see impact.h; NULL: none */
     const real *asked; /* errors of the rows that replace gap or slip; NULL: none */
     int refined; /* `given` is a solution with its multipliers: solve for its residual */
     real closing; /* above 0: accelerations close gaps by this factor */

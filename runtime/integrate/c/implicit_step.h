@@ -2,7 +2,7 @@
 #ifndef MSTMM_IMPLICIT_STEP_H
 #define MSTMM_IMPLICIT_STEP_H
 
-#include "work.h"
+#include "workspace.h"
 
 /* ---- for the loop: as the functions of step.h without "implicit" ---- */
 

@@ -4,7 +4,7 @@
  * States are interleaved: component i of node j at [(j / L) n L + i L + j % L] with L lanes. */
 #include <string.h>
 
-#include "iterate.h"
+#include "iterated_runge_kutta.h"
 
 MSTMM_INLINE int64_t lane_place(int64_t n, int lanes, int64_t component, int node)
 {

@@ -15,7 +15,7 @@
  * N. J. Higham, Functions of Matrices (2008), sections 10.3 and 10.7; A. H. Al-Mohy, N. J. Higham,
  * SIAM Journal on Scientific Computing 33 (2011) 488-511 (the motion above as one exponential);
  * B. N. Parlett, C. Reinsch, Numerische Mathematik 13 (1969) 293-304 (balancing). */
-#include "phi.h"
+#include "phi_functions.h"
 
 #include <math.h>
 #include <string.h>

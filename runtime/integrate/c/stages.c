@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "implicit_step.h"
-#include "iterate.h"
+#include "iterated_runge_kutta.h"
 #include "step.h"
 
 int mstmm_first_stage(const mstmm_work *work)

@@ -2,7 +2,7 @@
 #ifndef MSTMM_STEP_H
 #define MSTMM_STEP_H
 
-#include "work.h"
+#include "workspace.h"
 
 /* Phase of the loop between two calls */
 enum {

@@ -1,5 +1,5 @@
 /* Failures of a run, and numbers that are not finite. */
-#include "work.h"
+#include "workspace.h"
 
 int mstmm_note(mstmm_run *run, int status, int64_t code, int64_t component, double time)
 {

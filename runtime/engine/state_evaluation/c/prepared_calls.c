@@ -10,7 +10,7 @@
 
 enum { MOST_ROWS = 4, MOST_ANSWERS = 8, MOST_AXES = 3 };
 
-/* As alone.h has it. */
+/* As single_state.h has it. */
 typedef int called(const void *record, double number, const double *const *rows,
                    double *const *answers);
 

@@ -4,8 +4,8 @@
  *   w(theta) = theta phi_1(theta X) c_0 + theta^2 phi_2(theta X) c_1 + theta^3 phi_3(theta X) c_2,
  *
  * at any theta from 0 to 1, for a dense X of few rows. */
-#ifndef MSTMM_PHI_H
-#define MSTMM_PHI_H
+#ifndef MSTMM_PHI_FUNCTIONS_H
+#define MSTMM_PHI_FUNCTIONS_H
 
 #include <stdint.h>
 

@@ -1,12 +1,12 @@
 /* Workspace of a run, its right-hand side and its failures: the basis of all parts of the time
  * integration. */
-#ifndef MSTMM_WORK_H
-#define MSTMM_WORK_H
+#ifndef MSTMM_WORKSPACE_H
+#define MSTMM_WORKSPACE_H
 
 #include <math.h>
 
 #include "integrate.h"
-#include "phi.h"
+#include "phi_functions.h"
 #include "four_lanes.h"
 
 #define MSTMM_DEPTH 40 /* times that a part of a step is halved in search of an event */

@@ -1,6 +1,6 @@
 /* A scene whose accelerations come from code compiled for it. */
-#ifndef MSTMM_COMPILED_H
-#define MSTMM_COMPILED_H
+#ifndef MSTMM_FUSED_RHS_H
+#define MSTMM_FUSED_RHS_H
 
 #include "lanes.h"
 #include "scene.h"

@@ -1,6 +1,6 @@
 /* Fast calls on single states: everything that does not change is prepared once. */
-#ifndef MSTMM_ALONE_H
-#define MSTMM_ALONE_H
+#ifndef MSTMM_SINGLE_STATE_H
+#define MSTMM_SINGLE_STATE_H
 
 #include "fused.h"
 #include "scene.h"

@@ -1,8 +1,8 @@
 /* Couplings of distant bodies, which the tangent's elimination along the tree does not contain:
  * they are additional unknowns after those of the tree.  Unknown are changes of loads or efforts,
  * which must agree with the solution, and accelerations and multipliers of closing hinges. */
-#ifndef MSTMM_ACROSS_H
-#define MSTMM_ACROSS_H
+#ifndef MSTMM_OFF_TREE_COUPLING_H
+#define MSTMM_OFF_TREE_COUPLING_H
 
 #include "band_lu.h"
 #include "tangent_workspace.h"

@@ -1,8 +1,8 @@
 /* Harmonic response: Z(s) x = r with Z(s) = s^2 M + s C + K, the tangent in complex numbers.
  * Contributions of bodies are computed once per state; every s is one elimination, O(bodies), of
  * several s at a time. */
-#ifndef MSTMM_RESPONSE_HEADER
-#define MSTMM_RESPONSE_HEADER
+#ifndef MSTMM_HARMONIC_RESPONSE_H
+#define MSTMM_HARMONIC_RESPONSE_H
 
 #include "tangent.h"
 
