@@ -76,7 +76,8 @@ static int try_kernel(const mstmm_element *element, const mstmm_kernel *kernel, 
     if (bad) printf("%s.%s: undeclared code %d\n", element->name, kernel->name, code);
     for (int i = 0; i < kernel->n_inputs; ++i)
         if (memcmp(in[i], copy[i], size(&kernel->inputs[i], n) * sizeof **in) != 0) {
-            printf("%s.%s changed its input %s\n", element->name, kernel->name, kernel->inputs[i].name);
+            printf("%s.%s changed its input %s\n", element->name, kernel->name,
+                   kernel->inputs[i].name);
             bad = 1;
         }
     release(in, kernel->n_inputs);

@@ -3,8 +3,8 @@
 
 typedef struct {
     int (*f)(const void *model, double *workspace, double t, const double *q, const double *u,
-             const double *memory, const double *efforts, double *qdot, double *udot,
-             void *balance, int *failure);
+             const double *memory, const double *efforts, double *qdot, double *udot, void *balance,
+             int *failure);
     const void *model;
     double *workspace;
     int failure[4];

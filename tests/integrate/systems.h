@@ -5,10 +5,10 @@
 #include "integrate.h"
 
 typedef struct parameters {
-  double p[8];
-  double memory[4];
-  long calls; /* whatever the system counts */
-  const mstmm_system *system; /* for test_use_lanes */
+    double p[8];
+    double memory[4];
+    long calls; /* whatever the system counts */
+    const mstmm_system *system; /* for test_use_lanes */
 } parameters;
 
 #endif

@@ -46,7 +46,7 @@ class Library:
 
     def __init__(self, folder: Path) -> None:
         self.ffi: Any = cffi.FFI()
-        lines = (INTEGRATION / "phi.h").read_text().splitlines()
+        lines = (INTEGRATION / "phi_functions.h").read_text().splitlines()
         self.ffi.cdef("\n".join(line for line in lines if not line.startswith("#")))
         target = compile_library([INTEGRATION / "phi_functions.c"], folder / "phi.so", "-O2")
         self.lib: Any = self.ffi.dlopen(str(target))

@@ -81,7 +81,8 @@ int scalar_motion(const double *const *inputs, double t_end, int steps, int colu
             for (int m = j - 1; m >= 0; m--) {
                 const real ratio = (real)(j + 1) / (m + 1);
                 for (int i = 0; i < length; i++)
-                    table[m][i] = table[m + 1][i] + (table[m + 1][i] - table[m][i]) / (ratio * ratio - 1);
+                    table[m][i] =
+                        table[m + 1][i] + (table[m + 1][i] - table[m][i]) / (ratio * ratio - 1);
             }
         }
         for (int i = 0; i < length; i++) y[i] = table[0][i];

@@ -13,8 +13,8 @@ static int place_of(const step_record *step, int column)
 }
 
 /* x = U_ff^-1 (known - U_f), known LOADS x columns (NULL: zero). */
-static int at_input(const step_record *step, int body, const real *matrix, const real *known,
-                    real *x)
+static int input_relation(const step_record *step, int body, const real *matrix, const real *known,
+                          real *x)
 {
     const int rigid = step->rigid, length = length_of(step, body), columns = columns_of(step, body);
     real carried[LOADS * LOADS];
@@ -29,7 +29,7 @@ static int at_input(const step_record *step, int body, const real *matrix, const
 
 /* Loads at the hinge of a child by the motion of the parent's input end: its relation with the
  * outlet's positions put in. */
-static void at_outlet(const step_record *step, int body, int child, real *known)
+static void outlet_loads(const step_record *step, int body, int child, real *known)
 {
     const element *to = &step->elements[child];
     const int rigid = step->rigid, length = length_of(step, body), columns = columns_of(step, body);
@@ -47,8 +47,8 @@ static void at_outlet(const step_record *step, int body, int child, real *known)
 int classical_carried(const step_record *step, int body, int child, real *relation)
 {
     real known[LOADS * WIDEST];
-    at_outlet(step, body, child, known);
-    return at_input(step, body, step->elements[child].outlet, known, relation);
+    outlet_loads(step, body, child, known);
+    return input_relation(step, body, step->elements[child].outlet, known, relation);
 }
 
 /* Matrices of a body to all hinges that it carries; its modal rows for the first of them. */
@@ -67,7 +67,7 @@ int classical_outlets(const step_record *step, int body)
 int classical_alone(const step_record *step, int body, real *matrix, real *relation)
 {
     return classical_body(step, body, -1, matrix, step->elements[body].modal) ||
-           at_input(step, body, matrix, NULL, relation);
+           input_relation(step, body, matrix, NULL, relation);
 }
 
 /* f = S a + e at the input end: rigid x (rigid + modes + 1). */

@@ -44,8 +44,8 @@ typedef struct {
     /* Of the hinge on the parent at rest, in its frame; in the plane `turn` holds the angles of
      * this body's frame and of the hinge's axes */
     double place[3], turn[9];
-    double end[9];                     /* axes of the hinge on this body at rest, in its frame */
-    double law[16], law_axes[9];       /* of an elastic hinge, as the kernel of its law has them */
+    double end[9]; /* axes of the hinge on this body at rest, in its frame */
+    double law[16], law_axes[9]; /* of an elastic hinge, as the kernel of its law has them */
     /* Of a flexible parent at the hinge, and of this body at its own input end: */
     double shapes[9], slopes[9], held[9];
     /* Modal numbers: int rho phi, int rho x phi, symmetric matrices row by row */
@@ -55,11 +55,11 @@ typedef struct {
 typedef struct {
     double position[MSTMM_CLASSICAL_COORDINATES]; /* input end, angle, modes; no angle in space */
     double speed[MSTMM_CLASSICAL_COORDINATES];
-    double rate[MSTMM_CLASSICAL_COORDINATES];      /* accelerations */
+    double rate[MSTMM_CLASSICAL_COORDINATES]; /* accelerations */
     double auxiliary[MSTMM_CLASSICAL_COORDINATES]; /* auxiliary accelerations of the scheme */
-    double axes[9];                                /* frame to inertial, in space */
+    double axes[9]; /* frame to inertial, in space */
     double inboard[6], outboard[6]; /* moment and force of the hinge on its two sides */
-    double twist;                   /* of the law's memory */
+    double twist; /* of the law's memory */
 } mstmm_classical_motion;
 
 /* (1 - alpha_m) a' + alpha_m a = (1 - alpha_f) ydd' + alpha_f ydd over the step theta h, Newmark's
@@ -72,18 +72,18 @@ typedef struct {
     int n_bodies;
     const mstmm_classical_body *bodies;
     int planar, product; /* product of matrices; else Riccati on them */
-    int iterations;      /* most linear solutions a step */
-    int turning;         /* 0 omits the tangent operator of rotations, to show its effect */
+    int iterations; /* most linear solutions a step */
+    int turning; /* 0 omits the tangent operator of rotations, to show its effect */
     double gravity[3];
     mstmm_classical_scheme scheme;
-    double size;      /* length that corrections and gaps are compared with, m */
+    double size; /* length that corrections and gaps are compared with, m */
     double tolerance; /* iterations end if no correction exceeds this fraction of size, or rad */
-    double gap;       /* largest permitted gap of a hinge, relative to size, or rad */
-    double accuracy;  /* part of the largest load that the product may leave at a free tip */
-    double step;      /* the last one, 0 before the first */
+    double gap; /* largest permitted gap of a hinge, relative to size, or rad */
+    double accuracy; /* part of the largest load that the product may leave at a free tip */
+    double step; /* the last one, 0 before the first */
     mstmm_classical_motion *motions; /* now */
-    char *work;                      /* mstmm_classical_work_size bytes */
-    int64_t solutions;               /* linear solutions so far */
+    char *work; /* mstmm_classical_work_size bytes */
+    int64_t solutions; /* linear solutions so far */
     int failure, element;
 } mstmm_classical_run;
 

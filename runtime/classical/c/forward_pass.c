@@ -7,7 +7,7 @@
 
 /* State at the input of a hinge: positions and modes of the parent's end, loads by its relation;
  * along a chain of the product all from the state before. */
-static void state_before(const step_record *step, int index, real *z)
+static void inboard_state(const step_record *step, int index, real *z)
 {
     const body_record *bodies = step->run->bodies;
     const element *one = &step->elements[index];
@@ -30,7 +30,7 @@ static void state_before(const step_record *step, int index, real *z)
 }
 
 /* Loads that the product leaves at free tips, relative to the largest load. */
-static int lost(const step_record *step)
+static int check_lost_digits(const step_record *step)
 {
     const run_record *run = step->run;
     real size = 0, matrix[WIDEST * WIDEST], z[WIDEST], modal[MSTMM_CLASSICAL_MODES * WIDEST];
@@ -59,10 +59,10 @@ int classical_outward(const step_record *step)
         motion *at = &run->motions[i];
         const int inner = length_of(step, run->bodies[i].parent);
         real before[WIDEST];
-        state_before(step, i, before);
+        inboard_state(step, i, before);
         classical_multiply(length_of(step, i), inner, 1, one->hinge, before, one->state);
         memcpy(at->inboard, before + step->rigid, step->rigid * sizeof(real));
         memcpy(at->outboard, one->state + step->rigid, step->rigid * sizeof(real));
     }
-    return run->product ? lost(step) : 0;
+    return run->product ? check_lost_digits(step) : 0;
 }

@@ -6,8 +6,8 @@
 #include "hinges.h"
 
 /* Springs first, then the free rotation: two successive matrices. */
-static int both(const step_record *step, int index, const real *rows, const real *modal,
-                real *matrix)
+static int springs_then_rotation(const step_record *step, int index, const real *rows,
+                                 const real *modal, real *matrix)
 {
     const int inner = length_of(step, step->run->bodies[index].parent);
     const int middle = 2 * step->rigid + 1, outer = length_of(step, index);
@@ -18,7 +18,7 @@ static int both(const step_record *step, int index, const real *rows, const real
     return 0;
 }
 
-static int springs_and_turns(int hinge)
+static int has_springs_and_rotation(int hinge)
 {
     return hinge == MSTMM_CLASSICAL_ELASTIC_PIN || hinge == MSTMM_CLASSICAL_ELASTIC_BALL;
 }
@@ -29,7 +29,7 @@ int classical_condition(const step_record *step, int index, int outboard, real *
 {
     const body_record *body = &step->run->bodies[index];
     const int count = classical_free_turns(step, index);
-    if (outboard || !springs_and_turns(body->hinge)) {
+    if (outboard || !has_springs_and_rotation(body->hinge)) {
         classical_own_condition(step, index, outboard, 0, rows);
         return 0;
     }
@@ -49,6 +49,7 @@ int classical_hinge(const step_record *step, int index, const real *rows, const 
     if (body->hinge == MSTMM_CLASSICAL_FIXED) return classical_fixed(step, index, modal, matrix);
     if (body->hinge == MSTMM_CLASSICAL_ELASTIC)
         return classical_springs(step, index, body->modes, modal, matrix);
-    if (springs_and_turns(body->hinge)) return both(step, index, rows, modal, matrix);
+    if (has_springs_and_rotation(body->hinge))
+        return springs_then_rotation(step, index, rows, modal, matrix);
     return classical_turning(step, index, modes_of(step, body->parent), rows, modal, matrix);
 }

@@ -5,7 +5,7 @@
 
 const real classical_nothing[36] = {0};
 
-static void inertial(const motion *at, const real *per_mode, real *out)
+static void inertial_slopes(const motion *at, const real *per_mode, real *out)
 {
     real turn[3], tangent[9], rates[6];
     classical_multiply(3, 2, 1, per_mode, at->position + 6, turn);
@@ -20,11 +20,11 @@ slopes classical_slopes(const step_record *step, int index)
     const motion *motions = step->run->motions;
     slopes found = {{0}, {0}, classical_nothing, classical_nothing};
     if (modes_of(step, body->parent)) {
-        inertial(&motions[body->parent], body->slopes, found.inboard);
+        inertial_slopes(&motions[body->parent], body->slopes, found.inboard);
         found.eta_inboard = motions[body->parent].position + 6;
     }
     if (body->modes) {
-        inertial(&motions[index], body->held, found.outboard);
+        inertial_slopes(&motions[index], body->held, found.outboard);
         found.eta_outboard = motions[index].position + 6;
     }
     return found;
@@ -64,4 +64,18 @@ void classical_outboard_spin(const step_record *step, int index, real *spin)
 void classical_axis(const real *axes, real *axis)
 {
     for (int i = 0; i < 3; i++) axis[i] = axes[3 * i + 2];
+}
+
+/* Axis of a pin: of its inboard section, or outboard of springs, which tilt it, of its outboard
+ * section. */
+void classical_pin_axis(const step_record *step, int index, real *axis)
+{
+    const section held = classical_section(step, index);
+    real axes[9];
+    if (step->run->bodies[index].hinge != MSTMM_CLASSICAL_ELASTIC_PIN) {
+        classical_axis(held.axes, axis);
+        return;
+    }
+    classical_outboard_axes(step, index, axes);
+    classical_axis(axes, axis);
 }

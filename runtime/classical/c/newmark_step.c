@@ -23,7 +23,7 @@ static int coordinates_of(const step_record *step, int index)
     return step->rigid + modes_of(step, index);
 }
 
-static void turn_to(const step_record *step, int index)
+static void set_rotation(const step_record *step, int index)
 {
     element *one = &step->elements[index];
     motion *at = &step->run->motions[index];
@@ -44,12 +44,11 @@ static void predict(const step_record *step, int index, double h)
         const real a = start->auxiliary[i], rate = start->rate[i];
         const real next = (rate - scheme->alpha_m * a) / (1 - scheme->alpha_m);
         at->auxiliary[i] = next;
-        at->speed[i] =
-            start->speed[i] + h * ((1 - scheme->gamma) * a + scheme->gamma * next);
+        at->speed[i] = start->speed[i] + h * ((1 - scheme->gamma) * a + scheme->gamma * next);
         at->position[i] = start->position[i] + h * start->speed[i] +
                           h * h * ((0.5 - scheme->beta) * a + scheme->beta * next);
     }
-    turn_to(step, index);
+    set_rotation(step, index);
 }
 
 /* Adopts the solution's positions; returns its largest change, relative to size, or in rad. */
@@ -82,12 +81,12 @@ static real correct(const step_record *step, int index)
         largest = fmax(largest, fabs(change[i]) / (turns ? 1 : run->size));
         if (!isfinite(at->rate[i])) largest = INFINITY;
     }
-    turn_to(step, index);
+    set_rotation(step, index);
     return largest;
 }
 
 /* Wilson's method: from the end of the longer step back to that of the step. */
-static void go_back(const step_record *step, int index, double h)
+static void return_from_theta(const step_record *step, int index, double h)
 {
     const motion *start = &step->elements[index].start;
     motion *at = &step->run->motions[index];
@@ -99,11 +98,11 @@ static void go_back(const step_record *step, int index, double h)
         at->position[i] =
             start->position[i] + h * start->speed[i] + h * h / 6 * (2 * before + after);
     }
-    turn_to(step, index);
+    set_rotation(step, index);
 }
 
 /* Position gap of the hinge of a body, relative to size. */
-static real open_by(const step_record *step, int index)
+static real hinge_gap(const step_record *step, int index)
 {
     const int hinge = step->run->bodies[index].hinge;
     const motion *at = &step->run->motions[index];
@@ -112,19 +111,18 @@ static real open_by(const step_record *step, int index)
         return 0;
     const section held = classical_section(step, index);
     real gap = 0;
-    for (int i = 0; i < step->shifts; i++)
-        gap = hypot(gap, at->position[i] - held.position[i]);
+    for (int i = 0; i < step->shifts; i++) gap = hypot(gap, at->position[i] - held.position[i]);
     return gap / step->run->size;
 }
 
-static int solve(const step_record *step)
+static int solve_step(const step_record *step)
 {
     step->run->solutions++;
     if (step->run->product ? classical_product(step) : classical_riccati(step)) return 1;
     return classical_outward(step);
 }
 
-static int iterate(const step_record *step)
+static int iterate_step(const step_record *step)
 {
     run_record *run = step->run;
     const int most = run->step > 0 ? run->iterations : run->iterations + 2;
@@ -132,7 +130,7 @@ static int iterate(const step_record *step)
     real largest = 0;
     for (int k = 0; k < most; k++) {
         largest = 0;
-        if (solve(step)) return 1;
+        if (solve_step(step)) return 1;
         for (int i = 0; i < run->n_bodies; i++) {
             const real change = correct(step, i);
             if (!isfinite(change)) return fail(run, MSTMM_CLASSICAL_NOT_FINITE, i);
@@ -149,11 +147,13 @@ static int one_step(run_record *run, double h)
 {
     const mstmm_classical_scheme *scheme = &run->scheme;
     const double length = scheme->theta * h, weight = scheme->beta * length * length;
-    const step_record step = {
-        run, (element *)run->work,
-        {(1 - scheme->alpha_m) / ((1 - scheme->alpha_f) * weight),
-         scheme->gamma / (scheme->beta * length), 1 / weight},
-        run->planar ? 2 : 3, run->planar ? 1 : 3, run->planar ? 3 : 6};
+    const step_record step = {run,
+                              (element *)run->work,
+                              {(1 - scheme->alpha_m) / ((1 - scheme->alpha_f) * weight),
+                               scheme->gamma / (scheme->beta * length), 1 / weight},
+                              run->planar ? 2 : 3,
+                              run->planar ? 1 : 3,
+                              run->planar ? 3 : 6};
     for (int i = 0; i < run->n_bodies; i++) {
         motion *start = &step.elements[i].start;
         *start = run->motions[i];
@@ -163,10 +163,10 @@ static int one_step(run_record *run, double h)
         if (!run->planar) memset(start->position + ANGLE, 0, 3 * sizeof(real));
         predict(&step, i, length);
     }
-    if (iterate(&step)) return 1;
+    if (iterate_step(&step)) return 1;
     for (int i = 0; i < run->n_bodies; i++) {
-        if (scheme->theta > 1) go_back(&step, i, h);
-        if (!(open_by(&step, i) <= run->gap)) return fail(run, MSTMM_CLASSICAL_OPEN, i);
+        if (scheme->theta > 1) return_from_theta(&step, i, h);
+        if (!(hinge_gap(&step, i) <= run->gap)) return fail(run, MSTMM_CLASSICAL_OPEN, i);
     }
     run->step = h;
     return 0;

@@ -84,8 +84,9 @@ void classical_quaternion(const real *rotation, real *quaternion);
 /* body.c */
 section classical_section(const step_record *step, int body);
 int classical_body(const step_record *step, int body, int outlet, real *matrix, real *modal);
-/* hinge_matrices.c */
+/* free_rotation_conditions.c */
 int classical_free_turns(const step_record *step, int body);
+/* hinge_matrices.c */
 int classical_condition(const step_record *step, int body, int outboard, real *rows);
 int classical_hinge(const step_record *step, int body, const real *rows, const real *modal,
                     real *matrix);

@@ -13,7 +13,7 @@
 #define ROWS (2 * WIDEST)
 
 /* The body's matrix to its main child, with the loads of the other branches in it. */
-static int with_branches(const step_record *step, int index)
+static int add_branches(const step_record *step, int index)
 {
     const body_record *bodies = step->run->bodies;
     const int main = bodies[index].child, rigid = step->rigid, length = length_of(step, index);
@@ -67,7 +67,7 @@ static int one_hinge(const step_record *step, int index)
         if (classical_alone(step, index, to_tip, alone)) return 1;
     } else {
         const element *next = &step->elements[main];
-        if (classical_outlets(step, index) || with_branches(step, index)) return 1;
+        if (classical_outlets(step, index) || add_branches(step, index)) return 1;
         classical_multiply(last, length, length, next->chain, next->outlet, to_tip);
         waiting = next->conditions;
         classical_multiply(waiting, length, length, next->condition, next->outlet, rows);
@@ -113,7 +113,7 @@ static int last_turning(const step_record *step, int index)
 }
 
 /* Two directions across an axis. */
-static void across(const real *axis, real *directions)
+static void normal_directions(const real *axis, real *directions)
 {
     int least = 0;
     real size = 0;
@@ -145,7 +145,7 @@ static int free_tip(const step_record *step, int index, int length, real *rows)
     real directions[6];
     const section held = classical_section(step, last);
     const real axis[3] = {held.axes[2], held.axes[5], held.axes[8]};
-    across(axis, directions);
+    normal_directions(axis, directions);
     classical_multiply(2, 3, length, directions, chain + length * rigid, rows);
     memcpy(rows + 2 * length, chain + length * (rigid + turns), 3 * length * sizeof(real));
     return count;
@@ -171,8 +171,7 @@ static int boundary(const step_record *step, int index, int held, real *system)
         boundary_row(count, unknown, others, known, one->condition + length * k,
                      system + width * rows);
     for (int k = 0; !held && k < modes; k++, rows++)
-        boundary_row(count, unknown, others, known, one->modal + length * k,
-                     system + width * rows);
+        boundary_row(count, unknown, others, known, one->modal + length * k, system + width * rows);
     for (int k = 0; k < rows; k++) scale_row(width, system + width * k);
     return rows;
 }

@@ -4,8 +4,8 @@
 #include "parts.h"
 
 /* Conditions and modal rows with the loads put in, as rows on the state behind the hinge. */
-static int rows_behind(const step_record *step, int index, const real *relation, real *conditions,
-                       real *modal)
+static int outboard_rows(const step_record *step, int index, const real *relation, real *conditions,
+                         real *modal)
 {
     const int length = length_of(step, index), columns = columns_of(step, index);
     const int modes = modes_of(step, index), free = classical_free_turns(step, index);
@@ -24,7 +24,7 @@ static int rows_behind(const step_record *step, int index, const real *relation,
 }
 
 /* Relation before the hinge from the one behind it: (U_ff - S U_af) f = (S U_aa - U_fa) a + ... */
-static int passed(const step_record *step, int index, const real *behind)
+static int pass_relation(const step_record *step, int index, const real *behind)
 {
     element *one = &step->elements[index];
     const int parent = step->run->bodies[index].parent, rigid = step->rigid;
@@ -47,7 +47,8 @@ static int passed(const step_record *step, int index, const real *behind)
 }
 
 /* A free body: S a + e = 0 and its modal rows give the motion. */
-static int let_go(const step_record *step, int index, const real *behind, const real *modal)
+static int solve_free_body(const step_record *step, int index, const real *behind,
+                           const real *modal)
 {
     const int rigid = step->rigid, modes = modes_of(step, index), size = rigid + modes;
     const int width = size + 1, length = length_of(step, index);
@@ -71,12 +72,13 @@ int classical_riccati(const step_record *step)
     real modal[MSTMM_CLASSICAL_MODES * WIDEST];
     for (int i = step->run->n_bodies - 1; i >= 0; i--) {
         if (classical_outlets(step, i) || classical_absorbed(step, i, behind) ||
-            rows_behind(step, i, behind, conditions, modal))
+            outboard_rows(step, i, behind, conditions, modal))
             return fail(step->run, MSTMM_CLASSICAL_SINGULAR, i);
         const int free = step->run->bodies[i].hinge == MSTMM_CLASSICAL_FREE;
         real *hinge = step->elements[i].hinge;
-        if (free ? let_go(step, i, behind, modal)
-                 : classical_hinge(step, i, conditions, modal, hinge) || passed(step, i, behind))
+        if (free ? solve_free_body(step, i, behind, modal)
+                 : classical_hinge(step, i, conditions, modal, hinge) ||
+                       pass_relation(step, i, behind))
             return fail(step->run, MSTMM_CLASSICAL_SINGULAR, i);
     }
     return 0;

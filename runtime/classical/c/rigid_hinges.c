@@ -22,8 +22,7 @@ static int fixed_planar(const body_record *body, int inner, const real *modal, r
     case 0: return CALL(rigid_rigid, );
     case 1: return CALL(rigid_beam, , .W = modal, .Theta_O = body->held);
     case 2: return CALL(beam_rigid, , .Theta_I = body->slopes);
-    default:
-        return CALL(beam_beam, , .W = modal, .Theta_O = body->held, .Theta_I = body->slopes);
+    default: return CALL(beam_beam, , .W = modal, .Theta_O = body->held, .Theta_I = body->slopes);
     }
 #undef CALL
 }
@@ -55,10 +54,11 @@ static int smooth(const step_record *step, int inner, int outer, const real *row
 {
     const real *none = classical_nothing;
 #define BY_SPACE(pairing, ...)                                                                     \
-    (step->run->planar ? mstmm_discrete_smooth_planar_##pairing##_transfer(                        \
-                             .U = rows, .tau_n = none, .U_h = matrix __VA_ARGS__)                  \
-                       : mstmm_discrete_ball_spatial_##pairing##_transfer(                         \
-                             .U = rows, .tau_n = none, .U_h = matrix __VA_ARGS__))
+    (step->run->planar                                                                             \
+         ? mstmm_discrete_smooth_planar_##pairing##_transfer(.U = rows, .tau_n = none,             \
+                                                             .U_h = matrix __VA_ARGS__)            \
+         : mstmm_discrete_ball_spatial_##pairing##_transfer(.U = rows, .tau_n = none,              \
+                                                            .U_h = matrix __VA_ARGS__))
     switch (which_pairing(inner, outer)) {
     case 0: return BY_SPACE(rigid_rigid, );
     case 1: return BY_SPACE(rigid_beam, , .W = modal);
@@ -66,19 +66,6 @@ static int smooth(const step_record *step, int inner, int outer, const real *row
     default: return BY_SPACE(beam_beam, , .W = modal);
     }
 #undef BY_SPACE
-}
-
-/* The axis of a pin: its inboard section's, or behind springs, which tilt it, its outboard one's. */
-void classical_pin_axis(const step_record *step, int index, real *axis)
-{
-    const section held = classical_section(step, index);
-    real axes[9];
-    if (step->run->bodies[index].hinge != MSTMM_CLASSICAL_ELASTIC_PIN) {
-        classical_axis(held.axes, axis);
-        return;
-    }
-    classical_outboard_axes(step, index, axes);
-    classical_axis(axes, axis);
 }
 
 static int pin(const step_record *step, int index, int inner, const real *rows, const real *modal,
@@ -97,9 +84,9 @@ static int pin(const step_record *step, int index, int inner, const real *rows, 
         beta[i] = own[j] * axis[k] - own[k] * axis[j];
     }
 #define CALL(pairing, ...)                                                                         \
-    mstmm_discrete_pin_spatial_##pairing##_transfer(                                               \
-        .U = rows, .a = axis, .beta = beta, .a_n = first, .m_n = none, .tau_n = none,              \
-        .U_h = matrix __VA_ARGS__)
+    mstmm_discrete_pin_spatial_##pairing##_transfer(.U = rows, .a = axis, .beta = beta,            \
+                                                    .a_n = first, .m_n = none, .tau_n = none,      \
+                                                    .U_h = matrix __VA_ARGS__)
     switch (which_pairing(inner, body->modes)) {
     case 0: return CALL(rigid_rigid, );
     case 1: return CALL(rigid_beam, , OUTBOARD, .S_N = none);
@@ -110,7 +97,7 @@ static int pin(const step_record *step, int index, int inner, const real *rows, 
 }
 
 int classical_turning(const step_record *step, int index, int inner, const real *rows,
-                   const real *modal, real *matrix)
+                      const real *modal, real *matrix)
 {
     const int length = length_of(step, index), count = classical_free_turns(step, index);
     real carried[WIDEST * WIDEST] = {0};

@@ -52,22 +52,23 @@ static int planar_springs(const step_record *step, int index, int outer, const r
     const real rest = locked ? 0 : body->turn[0] + body->law[12];
     const real *zero = classical_nothing;
 #define CALL(pairing, ...)                                                                         \
-    mstmm_discrete_spring_planar_##pairing##_transfer(                                             \
-        .k_t = k_t, .c_t = c_t, .k_1 = &k_r, .k_3 = zero, .c_r = &c_r, .C = &step->map.c,          \
-        .D_phi = &c_phi, .phi_0 = &rest, .phi_s = &phi, .theta_s = &held.angle, .d_s = d,          \
-        .q_s = force, .U_h = matrix __VA_ARGS__)
+    mstmm_discrete_spring_planar_##pairing##_transfer(.k_t = k_t, .c_t = c_t, .k_1 = &k_r,         \
+                                                      .k_3 = zero, .c_r = &c_r, .C = &step->map.c, \
+                                                      .D_phi = &c_phi, .phi_0 = &rest,             \
+                                                      .phi_s = &phi, .theta_s = &held.angle,       \
+                                                      .d_s = d, .q_s = force,                      \
+                                                      .U_h = matrix __VA_ARGS__)
     switch (which_pairing(modes_of(step, body->parent), outer)) {
     case 0: return CALL(rigid_rigid, );
     case 1: return CALL(rigid_beam, , .W = modal, .Theta_O = body->held);
     case 2: return CALL(beam_rigid, , .Theta_I = body->slopes);
-    default:
-        return CALL(beam_beam, , .W = modal, .Theta_O = body->held, .Theta_I = body->slopes);
+    default: return CALL(beam_beam, , .W = modal, .Theta_O = body->held, .Theta_I = body->slopes);
     }
 #undef CALL
 }
 
 /* out = axes^T b, 3 x columns */
-static void into(const real *axes, int columns, const real *b, real *out)
+static void project_on_axes(const real *axes, int columns, const real *b, real *out)
 {
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < columns; j++) {
@@ -79,8 +80,8 @@ static void into(const real *axes, int columns, const real *b, real *out)
 
 /* Coordinates and speeds of the hinge as its law has them: position in inboard axes, quaternion;
  * velocity and spin in outboard axes.  Also the elongation in inertial axes. */
-static void relative(const step_record *step, int index, const section *held, const real *axes,
-                     real *elongation, real *q, real *u)
+static void relative_motion(const step_record *step, int index, const section *held,
+                            const real *axes, real *elongation, real *q, real *u)
 {
     const motion *at = &step->run->motions[index];
     real moved[3], spin[3], rotation[9];
@@ -94,11 +95,11 @@ static void relative(const step_record *step, int index, const section *held, co
         moved[i] = at->speed[i] - held->speed[i] -
                    (held->spin[j] * elongation[k] - held->spin[k] * elongation[j]);
     }
-    into(held->axes, 1, elongation, q);
-    into(held->axes, 3, axes, rotation);
+    project_on_axes(held->axes, 1, elongation, q);
+    project_on_axes(held->axes, 3, axes, rotation);
     classical_quaternion(rotation, q + 3);
-    into(axes, 1, moved, u);
-    into(axes, 1, spin, u + 3);
+    project_on_axes(axes, 1, moved, u);
+    project_on_axes(axes, 1, spin, u + 3);
 }
 
 /* Force and moment of springs and dampers on the outboard section, inertial axes, by the very law
@@ -109,7 +110,7 @@ static void spring_load(const step_record *step, int index, const section *held,
     const body_record *body = &step->run->bodies[index];
     motion *at = &step->run->motions[index];
     real q[7], u[6], tau[6], energy, power, twist;
-    relative(step, index, held, axes, elongation, q, u);
+    relative_motion(step, index, held, axes, elongation, q, u);
     mstmm_sweep_laws_six(body->law, q, u, body->law_axes, classical_nothing, &at->twist, tau,
                          &energy, &power, &twist);
     at->twist = twist;
@@ -128,8 +129,8 @@ static int turning_springs(const body_record *body, real rate, real *stiffness, 
         damping[k] = ball ? 0 : body->law[13 + k];
     }
     if (pin)
-        stiffness[2] = RIGID_BESIDE * fmax(stiffness[0] + rate * damping[0],
-                                           stiffness[1] + rate * damping[1]);
+        stiffness[2] =
+            RIGID_BESIDE * fmax(stiffness[0] + rate * damping[0], stiffness[1] + rate * damping[1]);
     return !ball;
 }
 
@@ -149,9 +150,10 @@ static int spatial_springs(const step_record *step, int index, int outer, const 
     turned_diagonal(3, axes, damping, c_r);
     const real *moment = turns ? load + 3 : classical_nothing;
 #define CALL(pairing, ...)                                                                         \
-    mstmm_discrete_elastic_spatial_##pairing##_transfer(                                           \
-        .k_t = k_t, .c_t = c_t, .k_r = k_r, .c_r = c_r, .C = &step->map.c, .d_s = d, .q_s = load,  \
-        .m_s = moment, .U_h = matrix __VA_ARGS__)
+    mstmm_discrete_elastic_spatial_##pairing##_transfer(.k_t = k_t, .c_t = c_t, .k_r = k_r,        \
+                                                        .c_r = c_r, .C = &step->map.c, .d_s = d,   \
+                                                        .q_s = load, .m_s = moment,                \
+                                                        .U_h = matrix __VA_ARGS__)
     switch (which_pairing(modes_of(step, body->parent), outer)) {
     case 0: return CALL(rigid_rigid, );
     case 1: return CALL(rigid_beam, , OUTBOARD);

@@ -1,5 +1,5 @@
 /* The sweeps in complex numbers once more, for processors that take four doubles at a time. */
-#include "response.h"
+#include "harmonic_response.h"
 
 #ifdef MSTMM_FOUR_LANES
 #pragma GCC target("avx2")

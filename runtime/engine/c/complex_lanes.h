@@ -4,7 +4,7 @@
 #ifndef MSTMM_COMPLEX_LANES_HEADER
 #define MSTMM_COMPLEX_LANES_HEADER
 
-#include "response.h"
+#include "harmonic_response.h"
 
 typedef double mstmm_lanes __attribute__((vector_size(8 * MSTMM_LANES)));
 typedef int64_t mstmm_bits __attribute__((vector_size(8 * MSTMM_LANES)));
@@ -70,8 +70,8 @@ MSTMM_COMPLEX double mstmm_complex_sizes(mstmm_complex a)
  * refused where it is zero alone: frequencies are asked for, and counted, next to where they
  * vanish, and the digits that are lost are told by how inertia grows (complex_sweeps.h). */
 MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *restrict a,
-                                        const mstmm_complex *restrict b, mstmm_complex *restrict x,
-                                        mstmm_complex *restrict work, double relative_pivot)
+                                         const mstmm_complex *restrict b, mstmm_complex *restrict x,
+                                         mstmm_complex *restrict work, double relative_pivot)
 {
     (void)relative_pivot;
     for (int i = 0; i < n * n; i++) work[i] = a[i];
@@ -98,19 +98,19 @@ MSTMM_COMPLEX int mstmm_complex_solve_lu(int n, int m, const mstmm_complex *rest
         for (int k = i + 1; k < n; k++) {
             const mstmm_complex factor = mstmm_complex_times(work[k * n + i], scale);
             for (int j = i + 1; j < n; j++)
-                work[k * n + j] = mstmm_complex_minus(
-                    work[k * n + j], mstmm_complex_times(factor, work[i * n + j]));
+                work[k * n + j] = mstmm_complex_minus(work[k * n + j],
+                                                      mstmm_complex_times(factor, work[i * n + j]));
             for (int j = 0; j < m; j++)
-                x[k * m + j] = mstmm_complex_minus(x[k * m + j],
-                                                   mstmm_complex_times(factor, x[i * m + j]));
+                x[k * m + j] =
+                    mstmm_complex_minus(x[k * m + j], mstmm_complex_times(factor, x[i * m + j]));
         }
     }
     for (int i = n - 1; i >= 0; i--)
         for (int j = 0; j < m; j++) {
             mstmm_complex rest = x[i * m + j];
             for (int k = i + 1; k < n; k++)
-                rest = mstmm_complex_minus(rest,
-                                           mstmm_complex_times(work[i * n + k], x[k * m + j]));
+                rest =
+                    mstmm_complex_minus(rest, mstmm_complex_times(work[i * n + k], x[k * m + j]));
             x[i * m + j] = mstmm_complex_times(rest, work[i * n + i]);
         }
     return 0;

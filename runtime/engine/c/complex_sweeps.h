@@ -13,7 +13,7 @@ typedef struct {
 } mstmm_lanes_at;
 
 /* Inertia in S: angular accelerations to moments, accelerations to forces. */
-static inline void inertia(const mstmm_complex *S, mstmm_lanes *sizes)
+static inline void inertia_sizes(const mstmm_complex *S, mstmm_lanes *sizes)
 {
     sizes[0] = sizes[1] = (mstmm_lanes){0};
     for (int row = 0; row < 3; row++)
@@ -24,8 +24,8 @@ static inline void inertia(const mstmm_complex *S, mstmm_lanes *sizes)
 }
 
 /* Contributions of bodies at s, numbers `first` to before `end`, written from `to`. */
-static void bring(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first, int64_t end,
-                  mstmm_complex *to)
+static void write_contributions(const mstmm_response *of, const mstmm_lanes_at *with, int64_t first,
+                                int64_t end, mstmm_complex *to)
 {
     const real *by_rate = of->brought, *by_square = by_rate + of->n_numbers;
     const real *lost = by_square + of->n_numbers;
@@ -38,7 +38,7 @@ static void bring(const mstmm_response *of, const mstmm_lanes_at *with, int64_t 
 }
 
 /* Contributions of a body, without numbers that the elimination computes; S in reused memory. */
-static void bring_body(const mstmm_response *of, mstmm_lanes_at *with, int index)
+static void write_body_contributions(const mstmm_response *of, mstmm_lanes_at *with, int index)
 {
     const mstmm_model *model = of->at->model;
     const mstmm_body *body = &model->bodies[index];
@@ -48,16 +48,16 @@ static void bring_body(const mstmm_response *of, mstmm_lanes_at *with, int index
     const int64_t end =
         index + 1 < model->n_bodies ? model->bodies[index + 1].tangent : of->n_numbers;
     mstmm_complex *numbers = with->tangents.numbers;
-    bring(of, with, own, B, numbers + mstmm_carried_at(&with->tangents, body));
-    bring(of, with, B, made, numbers + B);
-    bring(of, with, behind, end, numbers + behind);
+    write_contributions(of, with, own, B, numbers + mstmm_carried_at(&with->tangents, body));
+    write_contributions(of, with, B, made, numbers + B);
+    write_contributions(of, with, behind, end, numbers + behind);
 }
 
 /* --- bodies by their dynamic stiffness --- */
 
 /* Where the effect of cause `j` on `k` is, both of three rotations and three displacements of the
  * frame, and the shapes. */
-static mstmm_complex *of_both(mstmm_complex *S, mstmm_complex *bend, int n, int j, int k)
+static mstmm_complex *effect_entry(mstmm_complex *S, mstmm_complex *bend, int n, int j, int k)
 {
     const int load = k < 3 ? 3 + k : k - 3;
     if (j < 6)
@@ -67,7 +67,8 @@ static mstmm_complex *of_both(mstmm_complex *S, mstmm_complex *bend, int n, int 
 }
 
 /* Frames are described by accelerations: s^2 times their displacements. */
-static void lay_exact(const mstmm_response *of, mstmm_lanes_at *with, int body, int64_t first)
+static void write_exact_body(const mstmm_response *of, mstmm_lanes_at *with, int body,
+                             int64_t first)
 {
     const mstmm_body *one = &of->at->model->bodies[body];
     const int n = mstmm_modes_of(one->modal), size = 6 + n;
@@ -77,10 +78,10 @@ static void lay_exact(const mstmm_response *of, mstmm_lanes_at *with, int body, 
     const mstmm_complex per_square = mstmm_complex_inverse(with->square);
     for (int j = 0; j < size; j++)
         for (int k = 0; k < size; k++) {
-            mstmm_complex value, *to = of_both(S, bend, n, j, k);
+            mstmm_complex value, *to = effect_entry(S, bend, n, j, k);
             for (int lane = 0; lane < MSTMM_LANES; lane++) {
-                const real *from = of->exact
-                    + 2 * (with->place[lane] * of->exact_numbers + first + j * size + k);
+                const real *from =
+                    of->exact + 2 * (with->place[lane] * of->exact_numbers + first + j * size + k);
                 value.re[lane] = from[0];
                 value.im[lane] = from[1];
             }
@@ -117,8 +118,8 @@ static void keep_pivots(const mstmm_response *of, const mstmm_lanes_at *with, in
 
 /* Prefetches the numbers of a body for a sweep: contributions common to all frequencies, if
  * `brought`, results of the elimination, loads and motions. */
-static inline void ask_for(const mstmm_response *of, const mstmm_lanes_at *with, int index,
-                           int brought)
+static inline void prefetch_body(const mstmm_response *of, const mstmm_lanes_at *with, int index,
+                                 int brought)
 {
     const mstmm_model *model = of->at->model;
     if (index < 0 || index >= model->n_bodies) return;
@@ -150,23 +151,23 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
     with->grown = -1 + (mstmm_bits){0};
     for (int i = model->n_bodies - 1; i >= 0; i--) {
         const mstmm_body *body = &model->bodies[i];
-        const mstmm_complex *S =
-            with->tangents.numbers + mstmm_carried_at(&with->tangents, body);
+        const mstmm_complex *S = with->tangents.numbers + mstmm_carried_at(&with->tangents, body);
         const int least = mstmm_least_parent(model, i, i + 1);
         while (begun > least) {
-            if (mstmm_beyond_cache(model)) ask_for(of, with, begun - 1 - MSTMM_COMPLEX_AHEAD, 1);
-            bring_body(of, with, --begun);
+            if (mstmm_beyond_cache(model))
+                prefetch_body(of, with, begun - 1 - MSTMM_COMPLEX_AHEAD, 1);
+            write_body_contributions(of, with, --begun);
         }
         for (; next < of->n_exact && of->exact_bodies[next] >= begun; next++) {
             const int size = 6 + mstmm_modes_of(model->bodies[of->exact_bodies[next]].modal);
-            lay_exact(of, with, of->exact_bodies[next], exact);
+            write_exact_body(of, with, of->exact_bodies[next], exact);
             exact += size * size;
         }
         mstmm_lanes before[2], after[2];
-        inertia(S, before);
+        inertia_sizes(S, before);
         const int code = mstmm_complex_at_tangent_eliminated(&with->state, i);
         if (code) return code;
-        inertia(S, after);
+        inertia_sizes(S, after);
         for (int k = 0; k < 2; k++) {
             const mstmm_bits more = (before[k] > 0) & (after[k] > with->growth * before[k]);
             const mstmm_bits growth = (mstmm_bits)(after[k] / before[k]);
@@ -177,8 +178,8 @@ static int eliminate(mstmm_response *of, mstmm_lanes_at *with)
     return 0;
 }
 
-static int solve_alone(const mstmm_response *of, mstmm_lanes_at *with,
-                       const mstmm_complex *column, mstmm_complex *unit, mstmm_complex *x)
+static int solve_tree_in_lanes(const mstmm_response *of, mstmm_lanes_at *with,
+                               const mstmm_complex *column, mstmm_complex *unit, mstmm_complex *x)
 {
     mstmm_complex_state *state = &with->state;
     const int n = state->model->n_bodies, ahead = MSTMM_COMPLEX_AHEAD;
@@ -193,13 +194,13 @@ static int solve_alone(const mstmm_response *of, mstmm_lanes_at *with,
     if (unit) *unit = mstmm_complex_plain(1);
     for (int i = n - 1; !code && i >= 0; i--) {
         const int least = mstmm_least_parent(state->model, i, i + 1);
-        if (far) ask_for(of, with, i - ahead, 0);
+        if (far) prefetch_body(of, with, i - ahead, 0);
         for (; !code && begun > least; begun--)
             code = mstmm_complex_at_tangent_column(state, begun - 1);
         if (!code) code = mstmm_complex_at_tangent_carried(state, i);
     }
     for (int i = 0; !code && i < n; i++) {
-        if (far) ask_for(of, with, i + ahead, 0);
+        if (far) prefetch_body(of, with, i + ahead, 0);
         code = mstmm_complex_at_tangent_answered(state, i);
     }
     return code;
@@ -208,8 +209,8 @@ static int solve_alone(const mstmm_response *of, mstmm_lanes_at *with,
 /* --- couplings of distant bodies --- */
 
 /* Change of every coupling along x, lane by lane, real and imaginary parts one after the other. */
-static int coupled_along(mstmm_response *of, const mstmm_lanes_at *with, const mstmm_complex *x,
-                         mstmm_complex *changes)
+static int coupling_changes(mstmm_response *of, const mstmm_lanes_at *with, const mstmm_complex *x,
+                            mstmm_complex *changes)
 {
     const int nu = of->at->model->nu, m = of->at->n_coupled;
     real *moved = of->scratch, *d_u = moved + nu, *d_a = d_u + nu, *found = d_a + nu;
@@ -253,13 +254,13 @@ static int close_couplings(mstmm_response *of, mstmm_lanes_at *with)
     for (int k = 0; k < m; k++) {
         mstmm_complex *answer = (mstmm_complex *)of->answers + (int64_t)k * nu, *unit = NULL;
         if (k < loads)
-            unit = mstmm_block(model, with->slope.workspace, all->bodies[k / 6])
-                   + MSTMM_BLOCK_E + k % 6;
+            unit = mstmm_block(model, with->slope.workspace, all->bodies[k / 6]) + MSTMM_BLOCK_E +
+                   k % 6;
         else
             column[all->speeds[k - loads]] = mstmm_complex_plain(1);
-        int code = solve_alone(of, with, column, unit, answer);
+        int code = solve_tree_in_lanes(of, with, column, unit, answer);
         if (k >= loads) column[all->speeds[k - loads]] = mstmm_complex_plain(0);
-        if (!code) code = coupled_along(of, with, answer, changes);
+        if (!code) code = coupling_changes(of, with, answer, changes);
         if (code) return code;
         for (int i = 0; i < m; i++) {
             one[i * m + k] = mstmm_complex_plain(i == k);
@@ -275,12 +276,12 @@ static int add_couplings(mstmm_response *of, const mstmm_lanes_at *with, mstmm_c
     const int m = of->at->n_coupled, nu = of->at->model->nu;
     const mstmm_complex *inverse = (mstmm_complex *)of->closure;
     mstmm_complex *changes = (mstmm_complex *)of->closure + 4 * m * m;
-    const int code = coupled_along(of, with, x, changes);
+    const int code = coupling_changes(of, with, x, changes);
     for (int k = 0; !code && k < m; k++) {
         mstmm_complex amount = mstmm_complex_plain(0);
         for (int i = 0; i < m; i++)
-            amount = mstmm_complex_plus(amount,
-                                        mstmm_complex_times(inverse[k * m + i], changes[i]));
+            amount =
+                mstmm_complex_plus(amount, mstmm_complex_times(inverse[k * m + i], changes[i]));
         const mstmm_complex *answer = (mstmm_complex *)of->answers + (int64_t)k * nu;
         for (int j = 0; j < nu; j++)
             x[j] = mstmm_complex_plus(x[j], mstmm_complex_times(answer[j], amount));
@@ -290,7 +291,7 @@ static int add_couplings(mstmm_response *of, const mstmm_lanes_at *with, mstmm_c
 
 /* --- several s --- */
 
-static void take(mstmm_response *of, int count, const real *s, mstmm_lanes_at *with)
+static void set_up_lanes(mstmm_response *of, int count, const real *s, mstmm_lanes_at *with)
 {
     mstmm_tangent *at = of->at;
     for (int lane = 0; lane < MSTMM_LANES; lane++) { /* the last once more where there are fewer */
@@ -301,11 +302,14 @@ static void take(mstmm_response *of, int count, const real *s, mstmm_lanes_at *w
     }
     with->square = mstmm_complex_times(with->s, with->s);
     with->slope.workspace = (mstmm_complex *)of->workspace;
-    with->tangents = (mstmm_complex_tangents){
-        .numbers = (mstmm_complex *)of->numbers, .held = at->numbers};
-    with->state = (mstmm_complex_state){
-        .model = at->model, .workspace = at->workspace, .memory = at->memory,
-        .slope = &with->slope, .tangents = &with->tangents, .failure = &at->failure};
+    with->tangents =
+        (mstmm_complex_tangents){.numbers = (mstmm_complex *)of->numbers, .held = at->numbers};
+    with->state = (mstmm_complex_state){.model = at->model,
+                                        .workspace = at->workspace,
+                                        .memory = at->memory,
+                                        .slope = &with->slope,
+                                        .tangents = &with->tangents,
+                                        .failure = &at->failure};
 }
 
 #define MSTMM_BY_LANES_OF(lanes) mstmm_response_by_##lanes
@@ -317,13 +321,13 @@ void MSTMM_BY_LANES(MSTMM_LANES)(mstmm_response *of, int count, const real *s, i
     const int m = of->at->n_coupled, nu = of->at->model->nu;
     mstmm_complex *column = (mstmm_complex *)of->vectors, *answer = column + nu;
     mstmm_lanes_at with;
-    take(of, count, s, &with);
+    set_up_lanes(of, count, s, &with);
     int code = eliminate(of, &with);
     if (!code && of->pivots) keep_pivots(of, &with, count);
     if (!code && m) code = close_couplings(of, &with);
     for (int64_t k = 0; !code && k < n; k++) {
         for (int j = 0; j < nu; j++) column[j] = mstmm_complex_plain(columns[k * nu + j]);
-        code = solve_alone(of, &with, column, NULL, answer);
+        code = solve_tree_in_lanes(of, &with, column, NULL, answer);
         if (!code && m) code = add_couplings(of, &with, answer);
         for (int lane = 0; lane < count; lane++) {
             real *to = x + 2 * nu * (lane * n + k);

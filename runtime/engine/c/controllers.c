@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "control.h"
+#include "controllers.h"
 
 static const real SAME = 1e-9; /* of a sample time: a time so near to a sample is the sample */
 
@@ -14,14 +14,24 @@ int mstmm_measured(mstmm_scene_run *run, const mstmm_measure *measure, real t, c
     const real *u = y + model->nq;
     if (measure->observes) {
         if (run->base) run->base->known = 0; /* for the workspace is the same */
-        const int code = mstmm_observe(model, run->workspace, t, y, u, run->memory, shown,
-                                       &run->failure);
+        const int code =
+            mstmm_observe(model, run->workspace, t, y, u, run->memory, shown, &run->failure);
         if (code) return code;
     }
-    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory, .failure = &run->failure};
-    const real *inputs[] = {&t, y, u, shown->points, shown->loads, shown->efforts, shown->udot,
-                            shown->sums, mstmm_input_numbers(&state)};
+    mstmm_state state = {.model = model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .memory = run->memory,
+                         .failure = &run->failure};
+    const real *inputs[] = {&t,
+                            y,
+                            u,
+                            shown->points,
+                            shown->loads,
+                            shown->efforts,
+                            shown->udot,
+                            shown->sums,
+                            mstmm_input_numbers(&state)};
     real *outputs[] = {numbers};
     return mstmm_tape_run(measure->tape, inputs, mstmm_slots(&state), outputs)
                ? MSTMM_FAILED_EXPRESSION
@@ -49,7 +59,7 @@ static int is_due(const mstmm_controller *one, real *memory, real t)
     return t >= (memory[0] - SAME) * Ts;
 }
 
-static int act(const mstmm_controller *one, real *memory, real t)
+static int update_controller(const mstmm_controller *one, real *memory, real t)
 {
     real *x = memory + 1, *u = x + one->n_x;
     for (int j = 0; j < one->n_y; j++) one->y[j] -= one->reference[j];
@@ -64,7 +74,7 @@ static int act(const mstmm_controller *one, real *memory, real t)
     return all_finite(one->n_x + one->n_u, x);
 }
 
-static int fails(mstmm_scene_run *run, int number)
+static int note_controller_failure(mstmm_scene_run *run, int number)
 {
     run->failure = (mstmm_failure){MSTMM_FAILED_CONTROLLER, number, 0};
     return MSTMM_FAILED_CONTROLLER;
@@ -78,13 +88,14 @@ int mstmm_controllers_act(mstmm_scene_run *run, real t, const real *y)
         if (!is_due(one, run->memory + one->memory, t)) continue;
         const int code = mstmm_measured(run, one->measure, t, y, one->y);
         if (code) return code;
-        if (!all_finite(one->n_y, one->y)) return fails(run, k);
+        if (!all_finite(one->n_y, one->y)) return note_controller_failure(run, k);
         due = 1;
     }
     for (int k = 0; due && k < run->n_controllers; k++) {
         const mstmm_controller *one = &run->controllers[k];
         real *memory = run->memory + one->memory;
-        if (is_due(one, memory, t) && !act(one, memory, t)) return fails(run, k);
+        if (is_due(one, memory, t) && !update_controller(one, memory, t))
+            return note_controller_failure(run, k);
     }
     if (due && run->base) run->base->known = 0;
     return -due;

@@ -1,14 +1,14 @@
 /* Couplings: rows between coordinates of hinges, whose numbers one tape gives; see sweep.h. */
-#include "loops.h"
+#include "loop_closure.h"
 #include "sweep_steps.h"
 
-static real *loops_of(const mstmm_state *state)
+static real *loop_numbers(const mstmm_state *state)
 {
     return state->workspace + state->model->loops;
 }
 
 /* Which number of a coupling is the known part of its row. */
-static int at_level(const mstmm_state *state)
+static int known_number_index(const mstmm_state *state)
 {
     if (state->level == MSTMM_GAP) return MSTMM_COUPLING_GAP;
     return state->level == MSTMM_SLIP ? MSTMM_COUPLING_SLIP : MSTMM_COUPLING_DRIFT;
@@ -17,7 +17,7 @@ static int at_level(const mstmm_state *state)
 int mstmm_hook_couplings_valued(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
-    real *loops = loops_of(state);
+    real *loops = loop_numbers(state);
     const real *inputs[] = {&state->t, state->q, state->u};
     real *outputs[] = {loops + model->coupling_numbers};
     const int code = mstmm_tape_run(model->coupling_tape, inputs, mstmm_slots(state), outputs);
@@ -27,7 +27,7 @@ int mstmm_hook_couplings_valued(mstmm_state *state)
         real *numbers = loops + one->numbers;
         numbers[MSTMM_COUPLING_GAP] -= one->kept;
         if (one->row < 0) continue;
-        loops[MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN] = numbers[at_level(state)];
+        loops[MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN] = numbers[known_number_index(state)];
     }
     return 0;
 }
@@ -36,7 +36,7 @@ int mstmm_hook_coupling_slopes(mstmm_state *state)
 {
     const mstmm_model *model = state->model;
     mstmm_state *slope = state->slope;
-    real *loops = loops_of(slope);
+    real *loops = loop_numbers(slope);
     const real *inputs[] = {&state->t, state->q, state->u, &slope->t, slope->q, slope->u};
     real *outputs[] = {loops + model->coupling_numbers};
     const int code = mstmm_tape_run(model->coupling_slopes, inputs, mstmm_slots(slope), outputs);
@@ -53,14 +53,14 @@ int mstmm_hook_coupling_slopes(mstmm_state *state)
 real mstmm_coupling_lack(const mstmm_state *state, const mstmm_coupling *one)
 {
     if (one->of_speeds && state->level == MSTMM_GAP) return 0;
-    return loops_of(state)[one->numbers + at_level(state)];
+    return loop_numbers(state)[one->numbers + known_number_index(state)];
 }
 
 void mstmm_uncoupled(const mstmm_state *state, int index, real *efforts)
 {
     const mstmm_looped *looped = &state->model->looped[index];
     const int nu = state->model->bodies[index].nu;
-    const real *loops = loops_of(state);
+    const real *loops = loop_numbers(state);
     for (int k = 0; k < looped->n_pending + looped->n_own; k++) {
         const int own = k - looped->n_pending;
         const int64_t row = own < 0 ? looped->pending[k].row : looped->own[own].row;

@@ -41,8 +41,8 @@ static inline void mstmm_aim_unknown(mstmm_state *state, const mstmm_body *body,
     if (body->straight) {
         q[j] = 1 / step->sq;
     } else {
-        const real *along = step->numbers + body->tangent
-                            + MSTMM_TANGENT_ALONG(body->nu, body->nq) + j * body->nq;
+        const real *along =
+            step->numbers + body->tangent + MSTMM_TANGENT_ALONG(body->nu, body->nq) + j * body->nq;
         const real share = step->laws_alone ? 1 / step->sq : 1;
         for (int i = 0; i < body->nq; i++) q[i] = share * along[i];
     }

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-#include "compiled.h"
-#include "loops.h"
+#include "fused_rhs.h"
+#include "loop_closure.h"
 
 /* Results for closed loops: a change of the coordinates or speeds, and gaps. */
 static int64_t closing_size(const mstmm_fused *one)
@@ -21,7 +21,7 @@ int64_t mstmm_compiled_size(const mstmm_fused *one, const mstmm_fused *lanes)
     return one->nu + closing_size(one) + width * (one->nu + one->np + one->n_memory);
 }
 
-static void repeat(int64_t count, int lanes, const real *from, real *to)
+static void repeat_in_lanes(int64_t count, int lanes, const real *from, real *to)
 {
     for (int64_t i = 0; i < count; i++)
         for (int j = 0; j < lanes; j++) to[i * lanes + j] = from[i];
@@ -50,17 +50,10 @@ void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const ms
     run->fused_p = p;
     run->fused_numbers = numbers;
     memset(numbers, 0, (size_t)mstmm_compiled_size(one, lanes) * sizeof *numbers);
-    if (run->fused_lanes) repeat(one->np, lanes->lanes, p, lanes_p(run));
+    if (run->fused_lanes) repeat_in_lanes(one->np, lanes->lanes, p, lanes_p(run));
 }
 
-static int failed(mstmm_scene_run *run, const mstmm_fused *fused, int code)
-{
-    const int *failure = fused->failures + 3 * (code - 1);
-    run->failure = (mstmm_failure){failure[0], failure[1], failure[2]};
-    return failure[0];
-}
-
-static int accelerations(void *context, double t, const double *y, double *dy)
+static int fused_rhs(void *context, double t, const double *y, double *dy)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
@@ -68,42 +61,43 @@ static int accelerations(void *context, double t, const double *y, double *dy)
     const double *u = y + fused->nq;
     const int open = mstmm_stage_state(run, t, &y, &u);
     if (open) return open;
-    const int code = fused->accelerations(run->fused_p, &t, y, u, run->memory,
-                                          run->fused_numbers, dy, dy + fused->nq);
-    return code ? failed(run, fused, code) : 0;
+    const int code = fused->accelerations(run->fused_p, &t, y, u, run->memory, run->fused_numbers,
+                                          dy, dy + fused->nq);
+    return code ? mstmm_fused_failure(run, fused, code) : 0;
 }
 
-static int accelerations_and_power(void *context, double t, const double *y, double *dy)
+static int fused_rhs_with_power(void *context, double t, const double *y, double *dy)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused;
     real power = 0, potential;
     if (!fused->accelerations_power) { /* only impacts do work */
         dy[fused->nq + fused->nu] = 0;
-        return accelerations(context, t, y, dy);
+        return fused_rhs(context, t, y, dy);
     }
     mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
     const double *u = y + fused->nq;
     const int open = mstmm_stage_state(run, t, &y, &u);
     if (open) return open;
-    const int code = fused->accelerations_power(run->fused_p, &t, y, u, run->memory,
-                                                run->fused_numbers, dy, dy + fused->nq, &power,
-                                                &potential);
+    const int code =
+        fused->accelerations_power(run->fused_p, &t, y, u, run->memory, run->fused_numbers, dy,
+                                   dy + fused->nq, &power, &potential);
     dy[fused->nq + fused->nu] = code ? 0 : power;
-    return code ? failed(run, fused, code) : 0;
+    return code ? mstmm_fused_failure(run, fused, code) : 0;
 }
 
-static int accelerations_in_lanes(void *context, const double *t, const double *y, double *dy,
-                                  int *codes)
+static int fused_rhs_in_lanes(void *context, const double *t, const double *y, double *dy,
+                              int *codes)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *fused = run->fused_lanes;
     const int64_t start = (int64_t)fused->nq * fused->lanes;
-    if (fused->n_memory) repeat(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
+    if (fused->n_memory)
+        repeat_in_lanes(fused->n_memory, fused->lanes, run->memory, lanes_memory(run));
     const int any = fused->accelerations_lanes(lanes_p(run), t, y, y + start, lanes_memory(run),
                                                lanes_efforts(run), dy, dy + start, codes);
     for (int lane = 0; any && lane < fused->lanes; lane++)
-        if (codes[lane]) codes[lane] = failed(run, fused, codes[lane]);
+        if (codes[lane]) codes[lane] = mstmm_fused_failure(run, fused, codes[lane]);
     return any;
 }
 
@@ -111,147 +105,15 @@ void mstmm_scene_system(mstmm_scene_run *run, mstmm_system *system)
 {
     mstmm_looped_system(run, system);
     if (!run->fused) return;
-    system->rhs = run->with_power ? accelerations_and_power : accelerations;
+    system->rhs = run->with_power ? fused_rhs_with_power : fused_rhs;
     if (!run->fused_lanes) return;
     system->lanes = run->fused_lanes->lanes;
-    system->rhs_lanes = accelerations_in_lanes;
-}
-
-/* --- closed loops ----------------------------------------------------------------------------- */
-
-/* Maximum number of choices of rows at the end of a step. */
-#define CHOICES 3
-
-typedef struct {
-    mstmm_scene_run *run;
-    double t, *y;
-} compiled_state;
-
-/* Element index of an open loop: frame of closure k; couplings follow all bodies. */
-static int frame_of(const mstmm_model *model, int k)
-{
-    for (int i = 0; i < model->n_bodies; i++)
-        if (model->looped[i].closure && k-- == 0) return i;
-    return model->n_bodies + k;
-}
-
-static real largest(const mstmm_scene_run *run, const real *gaps, int *where)
-{
-    real found = 0;
-    int at = 0;
-    for (int k = 0; k < 6 * run->fused->n_closures; k++) {
-        if (fabs(gaps[k]) <= found) continue;
-        found = fabs(gaps[k]);
-        at = k / 6;
-    }
-    if (found > 0) *where = frame_of(run->model, at);
-    return found;
-}
-
-static int compiled_gaps(void *context, mstmm_gaps *found)
-{
-    const compiled_state *at = context;
-    mstmm_scene_run *run = at->run;
-    const mstmm_fused *fused = run->fused;
-    real *dq = run->fused_numbers + fused->nu, *gap = dq + fused->nq + fused->nu;
-    real *apart = gap + 6 * fused->n_closures;
-    const int code = fused->gaps(run->fused_p, &at->t, at->y, at->y + fused->nq, run->memory,
-                                 run->fused_numbers, dq, gap, apart);
-    if (code) return failed(run, fused, code);
-    found->met = largest(run, gap, &found->where_met);
-    found->repeated = largest(run, apart, &found->where_repeated);
-    for (int i = 0; i < fused->nq; i++) at->y[i] += dq[i];
-    mstmm_unit_quaternions(run->n_quaternions, run->quaternions, at->y);
-    return 0;
-}
-
-static int compiled_slips(void *context)
-{
-    const compiled_state *at = context;
-    mstmm_scene_run *run = at->run;
-    const mstmm_fused *fused = run->fused;
-    real *du = run->fused_numbers + fused->nu, *u = at->y + fused->nq;
-    const int code = fused->slips(run->fused_p, &at->t, at->y, u, run->memory,
-                                  run->fused_numbers, du, &run->strain);
-    if (code) return failed(run, fused, code);
-    for (int i = 0; i < fused->nu; i++) u[i] += du[i];
-    return 0;
-}
-
-static int close_loops(mstmm_scene_run *run, double t, double *y)
-{
-    const mstmm_model *model = run->model;
-    if (!run->fused) {
-        const int code = mstmm_close_loops(model, run->workspace, t, y, y + model->nq, run->memory,
-                                           run->n_quaternions, run->quaternions,
-                                           run->on_positions, &run->failure);
-        run->strain = mstmm_strain(model, run->workspace);
-        return code;
-    }
-    compiled_state at = {run, t, y};
-    mstmm_renew_inputs(&run->live, t, run->memory, run->fused_p);
-    const int near = model->strained >= 0 && run->memory[model->strained] > 0;
-    const mstmm_closing by = {&at, compiled_gaps, run->on_positions ? NULL : compiled_slips, near};
-    return mstmm_closed(&by, model, &run->failure);
-}
-
-int mstmm_scene_close_loops(mstmm_scene_run *run, double t, double *y)
-{
-    const mstmm_model *model = run->model;
-    int code = 0, changed = model->n_choices > 0;
-    run->rechosen = 0;
-    if (!changed) return close_loops(run, t, y);
-    for (int k = 0; k < CHOICES && changed && !code; k++) {
-        code = close_loops(run, t, y);
-        if (!code)
-            code = mstmm_choose_rows(model, run->workspace, t, y, run->memory, &changed,
-                                     &run->failure);
-        run->rechosen |= changed;
-    }
-    return code;
-}
-
-/* Coordinates of a stage with closed gaps, if possible. */
-static const double *stage_coordinates(mstmm_scene_run *run, double t, const double *y)
-{
-    const mstmm_model *model = run->model;
-    real *closed = run->speeds + model->nu;
-    const real strain = run->strain;
-    const mstmm_failure failure = run->failure;
-    memcpy(closed, y, (size_t)(model->nq + model->nu) * sizeof(real));
-    const int code = close_loops(run, t, closed);
-    run->strain = strain;
-    run->failure = failure;
-    return code ? y : closed;
-}
-
-int mstmm_stage_state(mstmm_scene_run *run, double t, const double **y, const double **u)
-{
-    if (!run->speeds || !(run->memory[run->model->strained] > 0)) return 0;
-    if (!run->model->loops_singular) *y = stage_coordinates(run, t, *y);
-    *u = *y + run->model->nq;
-    return mstmm_stage_speeds(run, t, *y, u);
-}
-
-int mstmm_stage_speeds(mstmm_scene_run *run, double t, const double *y, const double **u)
-{
-    const mstmm_model *model = run->model;
-    const mstmm_fused *fused = run->fused;
-    real *speeds = run->speeds, strain;
-    if (!speeds || !(run->memory[model->strained] > 0)) return 0;
-    const int code = fused ? fused->slips(run->fused_p, &t, y, *u, run->memory,
-                                          run->fused_numbers, speeds, &strain)
-                           : mstmm_correction(model, run->workspace, MSTMM_SLIP, 0, t, y, *u,
-                                              run->memory, speeds, NULL, &run->failure);
-    if (code) return fused ? failed(run, fused, code) : code;
-    for (int i = 0; i < model->nu; i++) speeds[i] += (*u)[i];
-    *u = speeds;
-    return 0;
+    system->rhs_lanes = fused_rhs_in_lanes;
 }
 
 /* --- trajectories in SIMD lanes ----------------------------------------------------------- */
 
-static int settle_one(void *context, double t, double *y)
+static int settle_lane(void *context, double t, double *y)
 {
     mstmm_scene_lanes *lanes = context;
     return mstmm_scene_settle(lanes->settle, t, y);
@@ -274,8 +136,8 @@ static void renew_lanes(const mstmm_scene_lanes *lanes, const double *t)
 
 /* mstmm_stage_speeds of one lane, in place among those of all.  Where there are none they stay:
  * what is evaluated with them says why. */
-static void stage_speeds_of(const mstmm_scene_lanes *lanes, int lane, real t, const real *y, real *speeds,
-                            real *one)
+static void project_lane_speeds(const mstmm_scene_lanes *lanes, int lane, real t, const real *y,
+                                real *speeds, real *one)
 {
     mstmm_scene_run *run = lanes->settle;
     const int64_t width = lanes->fused->lanes, nq = lanes->fused->nq, nu = lanes->fused->nu;
@@ -299,7 +161,8 @@ static const real *lanes_speeds(const mstmm_scene_lanes *lanes, const double *t,
     if (!any) return u;
     memcpy(speeds, u, (size_t)(width * nu) * sizeof(real));
     for (int lane = 0; lane < width; lane++)
-        if (lanes->near[lane]) stage_speeds_of(lanes, lane, t[lane], y, speeds, speeds + width * nu);
+        if (lanes->near[lane])
+            project_lane_speeds(lanes, lane, t[lane], y, speeds, speeds + width * nu);
     return speeds;
 }
 
@@ -324,7 +187,7 @@ static void lanes_enter(void *context, int lane, int64_t trajectory)
         lanes->numbers[i * lanes->fused->lanes + lane] = p[i];
 }
 
-static void lanes_accepted(void *context, int lane)
+static void lanes_accept(void *context, int lane)
 {
     mstmm_scene_lanes *lanes = context;
     const mstmm_scene_run *run = lanes->settle;
@@ -341,10 +204,10 @@ void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, ms
     mstmm_scene_system(lanes->settle, system);
     memset(lanes->numbers, 0, (size_t)mstmm_lanes_numbers(lanes->fused) * sizeof(real));
     system->context = lanes;
-    if (system->accept) system->accept = settle_one;
+    if (system->accept) system->accept = settle_lane;
     system->lanes = lanes->fused->lanes;
     system->rhs_lanes = lanes_rhs;
     group->system = system;
     group->enter = lanes_enter;
-    group->accepted = lanes_accepted;
+    group->accepted = lanes_accept;
 }

@@ -1,5 +1,5 @@
-/* Harmonic response; see response.h. */
-#include "response.h"
+/* Harmonic response; see harmonic_response.h. */
+#include "harmonic_response.h"
 
 #include <string.h>
 
@@ -7,7 +7,7 @@
 #define MSTMM_STILL 1e300
 
 /* Increase of the stiffness by the loss factors. */
-static int bring_losses(mstmm_response *of)
+static int write_losses(mstmm_response *of)
 {
     real *lost = of->brought + 2 * of->n_numbers;
     const int code = mstmm_tangent_brought(of->stiffer, 0, 0, 1);
@@ -30,11 +30,11 @@ int mstmm_response_begin(mstmm_response *of)
     if (!code) code = mstmm_tangent_brought(at, 0, 1, MSTMM_STILL);
     for (size_t k = 0; k < n; k++) by_square[k] = at->numbers[k] - by_square[k];
     if (!code) code = mstmm_tangent_brought(at, 0, 0, 1);
-    return code || !of->stiffer ? code : bring_losses(of);
+    return code || !of->stiffer ? code : write_losses(of);
 }
 
 /* How many frequencies go at a time on this processor, and by what. */
-static int lanes(const mstmm_response *of, mstmm_response_few **by)
+static int choose_lanes(const mstmm_response *of, mstmm_response_few **by)
 {
 #ifdef MSTMM_FOUR_LANES
     if (of->lanes != 2 && __builtin_cpu_supports("avx2")) {
@@ -48,7 +48,7 @@ static int lanes(const mstmm_response *of, mstmm_response_few **by)
 }
 
 /* The same with the numbers of s from number k on. */
-static mstmm_response from(const mstmm_response *of, int64_t k)
+static mstmm_response response_from(const mstmm_response *of, int64_t k)
 {
     mstmm_response at = *of;
     if (at.n_exact) at.exact += 2 * k * of->exact_numbers;
@@ -61,15 +61,15 @@ void mstmm_response_many(mstmm_response *of, int64_t count, const real *s, int64
 {
     const int64_t size = 2 * n * of->at->model->nu;
     mstmm_response_few *by;
-    const int most = lanes(of, &by);
+    const int most = choose_lanes(of, &by);
     for (int64_t k = 0; k < count; k += most) {
         const int some = count - k < most ? (int)(count - k) : most;
-        mstmm_response at = from(of, k);
+        mstmm_response at = response_from(of, k);
         by(&at, some, s + 2 * k, n, columns, x + k * size, growth + k, grown + k);
         /* A singular one invalidates the others in its vector. */
         const int spoiled = some > 1 && !isfinite(growth[k]);
         for (int j = 0; spoiled && j < some; j++) {
-            at = from(of, k + j);
+            at = response_from(of, k + j);
             by(&at, 1, s + 2 * (k + j), n, columns, x + (k + j) * size, growth + k + j,
                grown + k + j);
         }

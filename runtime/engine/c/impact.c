@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "bounce.h"
+#include "impact.h"
 #include "kernel_calls.h"
 #include "sweep_steps.h"
 
@@ -24,7 +24,7 @@ typedef struct {
     real *slopes, *efforts, *speeds, *before, *answer;
 } parts;
 
-static parts parts_of(const mstmm_scene_run *run, const mstmm_event_action *action)
+static parts impact_parts(const mstmm_scene_run *run, const mstmm_event_action *action)
 {
     const int nu = run->model->nu;
     parts at = {.slopes = action->numbers};
@@ -61,13 +61,21 @@ int mstmm_hook_struck(mstmm_state *state)
 
 /* Change of the speeds by efforts and forces along the derivatives of the event (NULL: none); it
  * includes the correction of velocity errors of closed loops. */
-static int answered(mstmm_scene_run *run, const mstmm_strike *strike, real t, const real *y,
-                    real *change)
+static int speed_change(mstmm_scene_run *run, const mstmm_strike *strike, real t, const real *y,
+                        real *change)
 {
     const mstmm_model *model = run->model;
-    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t, .q = y,
-                         .u = y + model->nq, .memory = run->memory, .udot = change, .observed = 1,
-                         .level = MSTMM_SLIP, .strike = strike, .failure = &run->failure};
+    mstmm_state state = {.model = model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .q = y,
+                         .u = y + model->nq,
+                         .memory = run->memory,
+                         .udot = change,
+                         .observed = 1,
+                         .level = MSTMM_SLIP,
+                         .strike = strike,
+                         .failure = &run->failure};
     memset(change, 0, (size_t)model->nu * sizeof(real));
     state.given = change;
     state.qdot = mstmm_spare_qdot(&state);
@@ -76,8 +84,8 @@ static int answered(mstmm_scene_run *run, const mstmm_strike *strike, real t, co
 }
 
 /* How the event is met with other speeds than those of y. */
-static int met(mstmm_scene_run *run, const mstmm_event_action *action, const real *slopes, real t,
-               const real *y, const real *u, mstmm_meeting *found)
+static int approach_at(mstmm_scene_run *run, const mstmm_event_action *action, const real *slopes,
+                       real t, const real *y, const real *u, mstmm_meeting *found)
 {
     const int code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
@@ -98,8 +106,8 @@ static int met(mstmm_scene_run *run, const mstmm_event_action *action, const rea
 static int slopes_at(mstmm_scene_run *run, const mstmm_event_action *action, real t, const real *y,
                      real *slopes)
 {
-    mstmm_state state = {.model = run->model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory};
+    mstmm_state state = {
+        .model = run->model, .workspace = run->workspace, .t = t, .memory = run->memory};
     const real *u = y + run->model->nq;
     const int code = mstmm_probes_seen(run, t, y, u);
     if (code) return code;
@@ -111,17 +119,17 @@ static int slopes_at(mstmm_scene_run *run, const mstmm_event_action *action, rea
 }
 
 /* w = M^-1 A^T with closed loops, and the correction of their velocity errors without impact. */
-static int thrown(mstmm_scene_run *run, const mstmm_event_action *action, parts at, real t,
-                  const real *y)
+static int impulse_response(mstmm_scene_run *run, const mstmm_event_action *action, parts at,
+                            real t, const real *y)
 {
     const int nu = run->model->nu;
-    const mstmm_strike strike = {.run = run, .action = action, .slopes = at.slopes,
-                                 .efforts = at.efforts};
+    const mstmm_strike strike = {
+        .run = run, .action = action, .slopes = at.slopes, .efforts = at.efforts};
     memset(at.efforts, 0, (size_t)nu * sizeof(real));
     for (int k = 0; k < action->n_slopes; k++)
         if (action->places[2 * k] >= 0) at.efforts[action->places[2 * k + 1]] += at.slopes[1 + k];
-    int code = answered(run, NULL, t, y, at.before);
-    if (!code) code = answered(run, &strike, t, y, at.answer);
+    int code = speed_change(run, NULL, t, y, at.before);
+    if (!code) code = speed_change(run, &strike, t, y, at.answer);
     for (int j = 0; j < nu; j++) {
         at.answer[j] -= at.before[j];
         at.speeds[j] = y[run->model->nq + j] + at.answer[j];
@@ -134,7 +142,7 @@ int mstmm_meeting_of(mstmm_scene_run *run, int event, real t, const real *y, con
 {
     const mstmm_event_action *action = &run->events[event];
     const int code = slopes_at(run, action, t, y, action->numbers);
-    return code ? code : met(run, action, action->numbers, t, y, u, found);
+    return code ? code : approach_at(run, action, action->numbers, t, y, u, found);
 }
 
 /* Impact: new speeds in y. */
@@ -143,8 +151,8 @@ static int strike(mstmm_scene_run *run, int event, parts at, real t, real *y, re
     const mstmm_event_action *action = &run->events[event];
     real *u = y + run->model->nq;
     mstmm_meeting behind;
-    int code = thrown(run, action, at, t, y);
-    if (!code) code = met(run, action, at.slopes, t, y, at.speeds, &behind);
+    int code = impulse_response(run, action, at, t, y);
+    if (!code) code = approach_at(run, action, at.slopes, t, y, at.speeds, &behind);
     if (!code && !(behind.rate - before > MOVED * behind.size)) {
         run->failure.element = event;
         code = run->failure.reason = MSTMM_FAILED_BOUNCE;
@@ -175,8 +183,8 @@ int mstmm_bounce(mstmm_scene_run *run, int event, real t, real *y)
     int code = mstmm_meeting_of(run, event, t, y, y + run->model->nq, &before);
     if (!code && !(before.rate > 0)) return MSTMM_FIRE_CONTINUE; /* it leaves already */
     if (!code)
-        code = (run->with_power ? strike_with_work : strike)(run, event, parts_of(run, action), t,
-                                                            y, before.rate);
+        code = (run->with_power ? strike_with_work : strike)(run, event, impact_parts(run, action),
+                                                             t, y, before.rate);
     if (code) return -code;
     *fastest = fmax(*fastest, before.rate);
     const int rests = action->restitution * before.rate < AT_REST * *fastest;

@@ -2,7 +2,7 @@
  * looped engine is used, which names the cause or needs no such guard. */
 #include <string.h>
 
-#include "compiled.h"
+#include "fused_rhs.h"
 
 #define CODE(run) ((run)->implicit_code.fused)
 
@@ -13,13 +13,25 @@ static const real *parameters(const mstmm_scene_run *run, real t)
     return run->implicit_code.p;
 }
 
-static mstmm_implicit_parts cut(int64_t nq, int64_t nu, real *numbers)
+static mstmm_implicit_parts cut_implicit_numbers(int64_t nq, int64_t nu, real *numbers)
 {
     mstmm_implicit_parts at = {.used = 0};
-    const struct { real **to; int64_t count; } all[] = {
-        {&at.t, 1}, {&at.q, nq}, {&at.u, nu}, {&at.a, nu}, {&at.steps, 3},
-        {&at.slopes, nu * (nq + nu)}, {&at.factors, nu * nu}, {&at.still_q, nq}, {&at.still_u, nu},
-        {&at.known_q, nq}, {&at.known_a, nu}, {&at.right, nu},
+    const struct {
+        real **to;
+        int64_t count;
+    } all[] = {
+        {&at.t, 1},
+        {&at.q, nq},
+        {&at.u, nu},
+        {&at.a, nu},
+        {&at.steps, 3},
+        {&at.slopes, nu * (nq + nu)},
+        {&at.factors, nu * nu},
+        {&at.still_q, nq},
+        {&at.still_u, nu},
+        {&at.known_q, nq},
+        {&at.known_a, nu},
+        {&at.right, nu},
     };
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         if (numbers) *all[i].to = numbers + at.used;
@@ -28,10 +40,13 @@ static mstmm_implicit_parts cut(int64_t nq, int64_t nu, real *numbers)
     return at;
 }
 
-int64_t mstmm_implicit_code_size(const mstmm_fused *fused) { return cut(fused->nq, fused->nu, NULL).used; }
+int64_t mstmm_implicit_code_size(const mstmm_fused *fused)
+{
+    return cut_implicit_numbers(fused->nq, fused->nu, NULL).used;
+}
 
-static int residual(void *context, double t, const double *y, const double *a, double *r,
-                    double *work)
+static int fused_residual(void *context, double t, const double *y, const double *a, double *r,
+                          double *work)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
@@ -43,7 +58,8 @@ static int residual(void *context, double t, const double *y, const double *a, d
     return failed ? run->implicit_code.looped.residual(run, t, y, a, r, work) : 0;
 }
 
-static int residual_rate(void *context, double t, const double *y, const double *a, double *r_t)
+static int fused_residual_rate(void *context, double t, const double *y, const double *a,
+                               double *r_t)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
@@ -51,12 +67,13 @@ static int residual_rate(void *context, double t, const double *y, const double 
         memset(r_t, 0, (size_t)code->nu * sizeof(real));
         return 0;
     }
-    const int failed = code->residual_rate(parameters(run, t), &t, y, y + code->nq, run->memory, a, r_t);
+    const int failed =
+        code->residual_rate(parameters(run, t), &t, y, y + code->nq, run->memory, a, r_t);
     return failed ? run->implicit_code.looped.residual_rate(run, t, y, a, r_t) : 0;
 }
 
 /* Rates do not depend on time. */
-static int rates(void *context, const double *q, const double *u, double *dq)
+static int fused_rates(void *context, const double *q, const double *u, double *dq)
 {
     mstmm_scene_run *run = context;
     const real t = 0;
@@ -64,8 +81,8 @@ static int rates(void *context, const double *q, const double *u, double *dq)
     return failed ? run->implicit_code.looped.rates(run, q, u, dq) : 0;
 }
 
-static int tangent(void *context, double t, const double *y, const double *a, double s, double sq,
-                   int kappa)
+static int fused_tangent(void *context, double t, const double *y, const double *a, double s,
+                         double sq, int kappa)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
@@ -79,8 +96,8 @@ static int tangent(void *context, double t, const double *y, const double *a, do
     /* Without kappa no increments are known, and no slopes are wanted. */
     const int failed =
         kappa && code->tangent_slopes
-            ? code->tangent_slopes(parameters(run, *at.t), at.t, at.q, at.u, run->memory, at.a, at.steps,
-                                   at.slopes, at.factors)
+            ? code->tangent_slopes(parameters(run, *at.t), at.t, at.q, at.u, run->memory, at.a,
+                                   at.steps, at.slopes, at.factors)
             : code->tangent(parameters(run, *at.t), at.t, at.q, at.u, run->memory, at.a, at.steps,
                             at.factors);
     run->implicit_code.looped_tangent = failed;
@@ -88,36 +105,36 @@ static int tangent(void *context, double t, const double *y, const double *a, do
 }
 
 /* The approximate tangent saves nothing in a small scene: the looped engine provides it. */
-static int laws(void *context, double t, const double *y, const double *a, double s, double sq,
-                int kappa)
+static int fused_laws(void *context, double t, const double *y, const double *a, double s,
+                      double sq, int kappa)
 {
     mstmm_scene_run *run = context;
     run->implicit_code.looped_tangent = 1;
     return run->implicit_code.looped.laws(run, t, y, a, s, sq, kappa);
 }
 
-static int coordinates(const mstmm_scene_run *run, const mstmm_implicit_parts *at, const real *x,
-                       const real *rho, real *dq)
+static int fused_coordinates(const mstmm_scene_run *run, const mstmm_implicit_parts *at,
+                             const real *x, const real *rho, real *dq)
 {
     return CODE(run)->coordinates(parameters(run, *at->t), at->t, at->q, at->u, run->memory, at->a,
                                   at->steps, x, rho, dq);
 }
 
 /* Known increments move to the right-hand side: dq_0 of rho_q, -rho_u of the accelerations. */
-static int without_known(const mstmm_scene_run *run, const mstmm_implicit_parts *at, const double *rho_q,
-                         const double *rho_u, const double *r)
+static int move_known_to_right(const mstmm_scene_run *run, const mstmm_implicit_parts *at,
+                               const double *rho_q, const double *rho_u, const double *r)
 {
     const mstmm_fused *code = CODE(run);
     for (int j = 0; j < code->nu; j++) at->known_a[j] = rho_u ? -rho_u[j] : 0;
     mstmm_tangent_free(run->base, at->known_a);
-    const int failed = coordinates(run, at, at->still_u, rho_q, at->known_q);
+    const int failed = fused_coordinates(run, at, at->still_u, rho_q, at->known_q);
     if (failed) return failed;
-    return code->rest(parameters(run, *at->t), at->t, at->q, at->u, run->memory, at->a, at->slopes, r,
-                      at->known_q, at->known_a, at->right);
+    return code->rest(parameters(run, *at->t), at->t, at->q, at->u, run->memory, at->a, at->slopes,
+                      r, at->known_q, at->known_a, at->right);
 }
 
-static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
-                 double *dq, double *du, double *da)
+static int fused_solve(void *context, const double *r, const double *rho_q, const double *rho_u,
+                       double *dq, double *du, double *da)
 {
     mstmm_scene_run *run = context;
     const mstmm_fused *code = CODE(run);
@@ -127,14 +144,15 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     const real *rho = rho_q ? rho_q : at.still_q;
     int failed = 0;
     if (rho_q || rho_u)
-        failed = without_known(run, &at, rho, rho_u, r);
+        failed = move_known_to_right(run, &at, rho, rho_u, r);
     else
         memcpy(at.right, r, (size_t)code->nu * sizeof(real));
     mstmm_tangent_free(run->base, at.right);
     if (!failed) failed = code->solution(at.factors, at.right, du);
-    if (!failed) failed = coordinates(run, &at, du, rho, dq);
+    if (!failed) failed = fused_coordinates(run, &at, du, rho, dq);
     if (failed) { /* guards have passed at this point before: not to be expected */
-        run->failure = (mstmm_failure){.reason = MSTMM_FAILED_TANGENT, .element = -1, .code = failed};
+        run->failure =
+            (mstmm_failure){.reason = MSTMM_FAILED_TANGENT, .element = -1, .code = failed};
         return MSTMM_FAILED_TANGENT;
     }
     for (int j = 0; j < code->nu; j++) da[j] = at.steps[0] * du[j] - (rho_u ? rho_u[j] : 0);
@@ -142,16 +160,18 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     return 0;
 }
 
-void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p,
-                            real *numbers)
+void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p, real *numbers)
 {
-    run->implicit_code = (mstmm_implicit_code){.fused = fused, .p = p, .looped = run->implicit,
-                                               .parts = cut(fused->nq, fused->nu, numbers)};
-    run->implicit.residual = residual;
-    run->implicit.residual_rate = residual_rate;
-    if (run->implicit.rates) run->implicit.rates = rates;
-    run->implicit.tangent = tangent;
-    run->implicit.laws = laws;
+    run->implicit_code =
+        (mstmm_implicit_code){.fused = fused,
+                              .p = p,
+                              .looped = run->implicit,
+                              .parts = cut_implicit_numbers(fused->nq, fused->nu, numbers)};
+    run->implicit.residual = fused_residual;
+    run->implicit.residual_rate = fused_residual_rate;
+    if (run->implicit.rates) run->implicit.rates = fused_rates;
+    run->implicit.tangent = fused_tangent;
+    run->implicit.laws = fused_laws;
     run->implicit.laws_spare = 0;
-    run->implicit.solve = solve;
+    run->implicit.solve = fused_solve;
 }

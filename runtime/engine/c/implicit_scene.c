@@ -1,19 +1,19 @@
 /* Interface of a scene to implicit methods: residual and factored tangent. */
 #include <string.h>
 
-#include "loops.h"
+#include "loop_closure.h"
 #include "scene.h"
 #include "sweep_steps.h"
 
-static int failed(mstmm_scene_run *run, const mstmm_tangent *at, int code)
+static int note_tangent_failure(mstmm_scene_run *run, const mstmm_tangent *at, int code)
 {
     if (code) run->failure = at->failure;
     return code;
 }
 
 /* With closed loops: what accelerations are beyond those that the constrained motion has. */
-static int beyond(mstmm_scene_run *run, double t, const double *y, const double *a, double *r,
-                  mstmm_balance *balance)
+static int excess_accelerations(mstmm_scene_run *run, double t, const double *y, const double *a,
+                                double *r, mstmm_balance *balance)
 {
     const mstmm_model *model = run->model;
     real *qdot = run->known, *f = qdot + model->nq;
@@ -25,103 +25,110 @@ static int beyond(mstmm_scene_run *run, double t, const double *y, const double 
 }
 
 /* And than those by which steps end with closed gaps. */
-static int beyond_placing(void *context, double t, const double *y, const double *a,
-                          double closing, double *r)
+static int excess_placing_accelerations(void *context, double t, const double *y, const double *a,
+                                        double closing, double *r)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     real *qdot = run->known, *found = qdot + model->nq;
-    const int code = mstmm_placing_accelerations(model, run->workspace, closing, t, y,
-                                                 y + model->nq, a, run->memory, qdot, found,
-                                                 &run->failure);
+    const int code =
+        mstmm_placing_accelerations(model, run->workspace, closing, t, y, y + model->nq, a,
+                                    run->memory, qdot, found, &run->failure);
     for (int j = 0; !code && j < model->nu; j++) r[j] = a[j] - found[j];
     if (!code) mstmm_tangent_free(run->base, r);
     return code;
 }
 
-static int residual(void *context, double t, const double *y, const double *a, double *r,
-                    double *work)
+static int looped_residual(void *context, double t, const double *y, const double *a, double *r,
+                           double *work)
 {
     mstmm_scene_run *run = context;
     mstmm_balance balance;
     const int wanted = work && run->with_power;
     if (run->model->looped) {
-        const int code = beyond(run, t, y, a, r, wanted ? &balance : NULL);
+        const int code = excess_accelerations(run, t, y, a, r, wanted ? &balance : NULL);
         if (wanted) *work = code ? 0 : balance.power;
         return code;
     }
-    const int code = mstmm_residual(run->stage, t, y, y + run->model->nq, a, r,
-                                    wanted ? &balance : NULL);
+    const int code =
+        mstmm_residual(run->stage, t, y, y + run->model->nq, a, r, wanted ? &balance : NULL);
     if (wanted) *work = code ? 0 : balance.power;
-    return failed(run, run->stage, code);
+    return note_tangent_failure(run, run->stage, code);
 }
 
 /* The point at which the equations are linearised, unless it is there already. */
-static int at_base(mstmm_scene_run *run, double t, const double *y, const double *a)
+static int move_base(mstmm_scene_run *run, double t, const double *y, const double *a)
 {
     const real *u = y + run->model->nq;
     if (run->model->looped) a = NULL; /* slopes are those of the accelerations there */
     if (mstmm_residual_is_at(run->base, t, y, u, a)) return 0;
-    return failed(run, run->base, mstmm_residual(run->base, t, y, u, a, run->known, NULL));
+    return note_tangent_failure(run, run->base,
+                                mstmm_residual(run->base, t, y, u, a, run->known, NULL));
 }
 
-static int residual_rate(void *context, double t, const double *y, const double *a, double *r_t)
+static int looped_residual_rate(void *context, double t, const double *y, const double *a,
+                                double *r_t)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     real *still = run->known;
     memset(r_t, 0, (size_t)model->nu * sizeof(real));
     if (run->steady) return 0;
-    const int code = at_base(run, t, y, a);
+    const int code = move_base(run, t, y, a);
     if (code) return code;
     if (model->looped) {
         const int failure = mstmm_accelerations_rate(run->base, r_t);
         for (int j = 0; j < model->nu; j++) r_t[j] = -r_t[j];
-        return failed(run, run->base, failure);
+        return note_tangent_failure(run, run->base, failure);
     }
     memset(still, 0, (size_t)(model->nq + 2 * model->nu) * sizeof(real));
-    return failed(run, run->base, mstmm_residual_slope(run->base, 1, still, still + model->nq,
-                                                       still + model->nq + model->nu, r_t));
+    return note_tangent_failure(run, run->base,
+                                mstmm_residual_slope(run->base, 1, still, still + model->nq,
+                                                     still + model->nq + model->nu, r_t));
 }
 
-static int slope(void *context, double t, const double *y, const double *a, const double *dq,
-                 const double *du, double *d_rates, double *d_r)
+static int looped_slope(void *context, double t, const double *y, const double *a, const double *dq,
+                        const double *du, double *d_rates, double *d_r)
 {
     mstmm_scene_run *run = context;
-    int code = at_base(run, t, y, a);
+    int code = move_base(run, t, y, a);
     if (code) return code;
     memset(run->known, 0, (size_t)run->model->nu * sizeof(real));
     code = mstmm_residual_slope(run->base, 0, dq, du, run->known, d_r);
     if (!code) mstmm_rates_slope(run->base, d_rates);
-    return failed(run, run->base, code);
+    return note_tangent_failure(run, run->base, code);
 }
 
-static int rates(void *context, const double *q, const double *u, double *dq)
+static int looped_rates(void *context, const double *q, const double *u, double *dq)
 {
     mstmm_scene_run *run = context;
-    return failed(run, run->stage, mstmm_tangent_rates(run->stage, q, u, dq));
+    return note_tangent_failure(run, run->stage, mstmm_tangent_rates(run->stage, q, u, dq));
 }
 
-static int tangent(void *context, double t, const double *y, const double *a, double s, double sq,
-                   int kappa)
+static int looped_tangent(void *context, double t, const double *y, const double *a, double s,
+                          double sq, int kappa)
 {
     mstmm_scene_run *run = context;
-    const int code = at_base(run, t, y, a);
-    return code ? code : failed(run, run->base, mstmm_tangent_factor(run->base, 1, s, sq, kappa));
+    const int code = move_base(run, t, y, a);
+    return code ? code
+                : note_tangent_failure(run, run->base,
+                                       mstmm_tangent_factor(run->base, 1, s, sq, kappa));
 }
 
-static int laws(void *context, double t, const double *y, const double *a, double s, double sq,
-                int kappa)
+static int looped_laws(void *context, double t, const double *y, const double *a, double s,
+                       double sq, int kappa)
 {
     mstmm_scene_run *run = context;
-    const int code = at_base(run, t, y, a);
-    return code ? code : failed(run, run->base, mstmm_laws_factor(run->base, 1, s, sq, kappa));
+    const int code = move_base(run, t, y, a);
+    return code ? code
+                : note_tangent_failure(run, run->base,
+                                       mstmm_laws_factor(run->base, 1, s, sq, kappa));
 }
 
 /* With the approximate tangent known increments use it too: methods that accept any tangent need
  * the same one everywhere. */
-static int solve_by_laws(mstmm_scene_run *run, const double *r, const double *rho_q,
-                         const double *rho_u, double *dq, double *du, double *da)
+static int looped_solve_by_laws(mstmm_scene_run *run, const double *r, const double *rho_q,
+                                const double *rho_u, double *dq, double *du, double *da)
 {
     const int nu = run->model->nu, known = rho_q || rho_u;
     mstmm_tangent *base = run->base;
@@ -133,17 +140,17 @@ static int solve_by_laws(mstmm_scene_run *run, const double *r, const double *rh
     if (!code) code = mstmm_laws_solve(base, r, known ? known_q : NULL, known_u, da);
     for (int j = 0; !code && j < nu; j++) du[j] = da[j] / base->s + known_u[j];
     if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
-    return failed(run, base, code);
+    return note_tangent_failure(run, base, code);
 }
 
 /* Known increments: the coordinates' of rho_q, -rho_u of the accelerations. */
-static int solve(void *context, const double *r, const double *rho_q, const double *rho_u,
-                 double *dq, double *du, double *da)
+static int looped_solve(void *context, const double *r, const double *rho_q, const double *rho_u,
+                        double *dq, double *du, double *da)
 {
     mstmm_scene_run *run = context;
     const int nq = run->model->nq, nu = run->model->nu;
     mstmm_tangent *base = run->base;
-    if (base->laws_alone) return solve_by_laws(run, r, rho_q, rho_u, dq, du, da);
+    if (base->laws_alone) return looped_solve_by_laws(run, r, rho_q, rho_u, dq, du, da);
     real *known_q = run->known, *still = known_q + nq, *known_a = still + nu;
     const mstmm_known known = {.q = known_q, .a = known_a};
     const int evaluated = run->implicit.evaluated, some = rho_q || rho_u || evaluated;
@@ -160,18 +167,23 @@ static int solve(void *context, const double *r, const double *rho_q, const doub
     if (!code) code = mstmm_tangent_coordinates(base, du, rho_q, dq);
     for (int j = 0; !code && j < nu; j++) da[j] = base->s * du[j] - (rho_u ? rho_u[j] : 0);
     if (!code) mstmm_tangent_free(base, da);
-    return failed(run, base, code);
+    return note_tangent_failure(run, base, code);
 }
 
 /* Values prescribed by drives at t, and zero accelerations of held hinges. */
-static int impose(void *context, double t, double *y, double *a)
+static int looped_impose(void *context, double t, double *y, double *a)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
     mstmm_tangent_free(run->stage, a);
     if (!model->n_drives) return 0;
-    mstmm_state state = {.model = model, .workspace = run->workspace, .t = t, .q = y,
-                         .u = y + model->nq, .memory = run->memory, .failure = &run->failure};
+    mstmm_state state = {.model = model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .q = y,
+                         .u = y + model->nq,
+                         .memory = run->memory,
+                         .failure = &run->failure};
     const int code = mstmm_run_given(&state);
     if (code) return code;
     memcpy(y, state.q, (size_t)model->nq * sizeof(real));
@@ -185,7 +197,7 @@ static int impose(void *context, double t, double *y, double *a)
     return 0;
 }
 
-static int somebody_imposes(const mstmm_model *model)
+static int has_imposed_speeds(const mstmm_model *model)
 {
     for (int i = 0; i < model->n_bodies; i++)
         if (model->bodies[i].n_imposed) return 1;
@@ -195,7 +207,7 @@ static int somebody_imposes(const mstmm_model *model)
 /* True if the rates of all coordinates are the speeds in the same order.  Driven ones have none. */
 static int is_straight(const mstmm_model *model)
 {
-    if (somebody_imposes(model)) return 0;
+    if (has_imposed_speeds(model)) return 0;
     for (int i = 0; i < model->n_bodies; i++)
         if (!model->bodies[i].straight) return 0;
     return 1;
@@ -207,17 +219,25 @@ void mstmm_scene_implicit(mstmm_scene_run *run, mstmm_system *system)
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_body *body = &model->bodies[i];
         for (int j = 0; j < body->nu; j++) /* the vector part of a quaternion is last */
-            run->coordinates[body->u + j] = body->q + j
-                                            + (j + 3 >= body->nu ? body->nq - body->nu : 0);
+            run->coordinates[body->u + j] =
+                body->q + j + (j + 3 >= body->nu ? body->nq - body->nu : 0);
         for (int j = 0; body->modal && j < body->modal->n; j++)
             run->coordinates[body->modal->u + j] = body->modal->q + j;
     }
     run->implicit = (mstmm_implicit){
-        .n_q = model->nq, .n_u = model->nu, .evaluated = model->looped != NULL, .coordinates = run->coordinates, .residual = residual,
-        .residual_rate = residual_rate, .rates = is_straight(model) ? NULL : rates,
-        .tangent = tangent, .laws = model->looped ? NULL : laws,
-        .laws_spare = 1, .solve = solve, .slope = slope,
-        .impose = somebody_imposes(model) ? impose : NULL,
+        .n_q = model->nq,
+        .n_u = model->nu,
+        .evaluated = model->looped != NULL,
+        .coordinates = run->coordinates,
+        .residual = looped_residual,
+        .residual_rate = looped_residual_rate,
+        .rates = is_straight(model) ? NULL : looped_rates,
+        .tangent = looped_tangent,
+        .laws = model->looped ? NULL : looped_laws,
+        .laws_spare = 1,
+        .solve = looped_solve,
+        .slope = looped_slope,
+        .impose = has_imposed_speeds(model) ? looped_impose : NULL,
     };
     system->implicit = &run->implicit;
 }
@@ -231,7 +251,7 @@ static void ask_positions(void *context, int asked)
 void mstmm_scene_on_positions(mstmm_scene_run *run)
 {
     if (!run->model->looped) return; /* no rows, no constraints */
-    run->implicit.placing = beyond_placing;
+    run->implicit.placing = excess_placing_accelerations;
     run->implicit.ask_positions = ask_positions;
     ask_positions(run, 1);
 }

@@ -7,12 +7,18 @@
 #include "kernel_calls.h"
 #include "sweep_steps.h"
 
-static mstmm_state state_of(const mstmm_kinematics *known, const real *q, const real *u,
-                            const real *udot, mstmm_failure *failure)
+static mstmm_state kinematic_state(const mstmm_kinematics *known, const real *q, const real *u,
+                                   const real *udot, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = known->model, .workspace = known->workspace,
-                         .memory = known->memory, .q = q, .u = u, .given = udot,
-                         .required = known->work, .observed = 1, .failure = failure};
+    mstmm_state state = {.model = known->model,
+                         .workspace = known->workspace,
+                         .memory = known->memory,
+                         .q = q,
+                         .u = u,
+                         .given = udot,
+                         .required = known->work,
+                         .observed = 1,
+                         .failure = failure};
     state.qdot = mstmm_spare_qdot(&state);
     mstmm_ground(&state);
     return state;
@@ -24,26 +30,26 @@ int mstmm_moving_points(const mstmm_kinematics *known, int64_t n, const real *q,
 {
     const mstmm_model *model = known->model;
     for (int64_t k = 0; k < n; k++) {
-        mstmm_state state = state_of(known, q + k * model->nq, u + k * model->nu,
-                                     udot + k * model->nu, failure);
+        mstmm_state state = kinematic_state(known, q + k * model->nq, u + k * model->nu,
+                                            udot + k * model->nu, failure);
         const int code = mstmm_run_motion(&state);
         if (code) return code;
         for (int i = 0; i < n_probes; i++)
             mstmm_point_shown(&state, &probes[i], mstmm_zeros,
-                              points + ((size_t)k * (size_t)n_probes + (size_t)i) * MSTMM_PROBE_NUMBERS);
+                              points +
+                                  ((size_t)k * (size_t)n_probes + (size_t)i) * MSTMM_PROBE_NUMBERS);
     }
     return 0;
 }
 
 /* Efforts of a unit force or moment against an inertial axis on the speeds towards the root. */
-static int felt_on_the_way(mstmm_state *state, const mstmm_probe *probe, int direction, real *row)
+static int path_efforts(mstmm_state *state, const mstmm_probe *probe, int direction, real *row)
 {
     const mstmm_body *bodies = state->model->bodies;
     real load[6] = {0};
     load[direction] = -1;
     for (int i = probe->body; i >= 0; i = bodies[i].parent)
-        memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0,
-               6 * sizeof(real));
+        memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
     real *block = mstmm_block(state->model, state->workspace, probe->body);
     mstmm_frames_applied_load(.A = block + MSTMM_BLOCK_A, .A_F = mstmm_identity,
                               .offset = probe->offset, .F = load, .M = load + 3,
@@ -64,14 +70,14 @@ static int added_by_speeds(mstmm_state *state, const mstmm_probe *probe, real *r
     int code = 0;
     memset(rows, 0, (size_t)(6 * nu) * sizeof(real));
     for (int k = 0; !code && k < 6 && probe->body >= 0; k++)
-        code = felt_on_the_way(state, probe, k, rows + k * nu);
+        code = path_efforts(state, probe, k, rows + k * nu);
     return code;
 }
 
 int mstmm_jacobians(const mstmm_kinematics *known, const real *q, int n_probes,
                     const mstmm_probe *probes, real *rows, mstmm_failure *failure)
 {
-    mstmm_state state = state_of(known, q, known->none, known->none, failure);
+    mstmm_state state = kinematic_state(known, q, known->none, known->none, failure);
     int code = mstmm_run_motion(&state);
     for (int i = 0; !code && i < n_probes; i++)
         code = added_by_speeds(&state, &probes[i], rows + 6 * i * known->model->nu);
@@ -81,12 +87,12 @@ int mstmm_jacobians(const mstmm_kinematics *known, const real *q, int n_probes,
 /* --- one state after the other ---------------------------------------------------------------- */
 
 /* A state after a sweep of its motion; returns 0 where it has none. */
-static int moves(const mstmm_points *points, const real *q, const real *u, mstmm_state *state,
-                 mstmm_failure *failure)
+static int run_motion(const mstmm_points *points, const real *q, const real *u, mstmm_state *state,
+                      mstmm_failure *failure)
 {
     const mstmm_model *model = points->at.model;
     if (!mstmm_finite(model->nq, q) || !mstmm_finite(model->nu, u)) return 0;
-    *state = state_of(&points->at, q, u, points->at.none, failure);
+    *state = kinematic_state(&points->at, q, u, points->at.none, failure);
     return !mstmm_run_motion(state);
 }
 
@@ -98,7 +104,7 @@ int mstmm_points_places(const void *record, real none, const real *const *rows,
     mstmm_state state;
     mstmm_failure failure;
     (void)none;
-    if (!moves(points, rows[0], points->at.none, &state, &failure)) return 1;
+    if (!run_motion(points, rows[0], points->at.none, &state, &failure)) return 1;
     for (int i = 0; i < points->n_probes; i++) {
         mstmm_point_shown(&state, &points->probes[i], mstmm_zeros, shown);
         memcpy(answers[0] + 3 * i, shown, 3 * sizeof(real));
@@ -106,15 +112,14 @@ int mstmm_points_places(const void *record, real none, const real *const *rows,
     return 0;
 }
 
-int mstmm_points_poses(const void *record, real none, const real *const *rows,
-                       real *const *answers)
+int mstmm_points_poses(const void *record, real none, const real *const *rows, real *const *answers)
 {
     const mstmm_points *points = record;
     real shown[MSTMM_PROBE_NUMBERS];
     mstmm_state state;
     mstmm_failure failure;
     (void)none;
-    if (!moves(points, rows[0], points->at.none, &state, &failure)) return 1;
+    if (!run_motion(points, rows[0], points->at.none, &state, &failure)) return 1;
     for (int i = 0; i < points->n_probes; i++) {
         real *pose = answers[0] + 16 * i;
         mstmm_point_shown(&state, &points->probes[i], mstmm_zeros, shown);
@@ -136,7 +141,7 @@ int mstmm_points_velocities(const void *record, real none, const real *const *ro
     mstmm_state state;
     mstmm_failure failure;
     (void)none;
-    if (!moves(points, rows[0], rows[1], &state, &failure)) return 1;
+    if (!run_motion(points, rows[0], rows[1], &state, &failure)) return 1;
     for (int i = 0; i < points->n_probes; i++) {
         mstmm_point_shown(&state, &points->probes[i], mstmm_zeros, shown);
         memcpy(answers[0] + 6 * i, shown + 3, 3 * sizeof(real));
@@ -164,8 +169,9 @@ static int gains_of(mstmm_state *state, const mstmm_probe *probe, const int *way
     real shown[MSTMM_PROBE_NUMBERS];
     for (int k = first; k >= 0; k--) {
         const int parent = state->model->bodies[way[k]].parent;
-        const int code = mstmm_at_forward(
-            state, way[k], mstmm_block(state->model, state->workspace, parent) + MSTMM_BLOCK_MOTION);
+        const int code = mstmm_at_forward(state, way[k],
+                                          mstmm_block(state->model, state->workspace, parent) +
+                                              MSTMM_BLOCK_MOTION);
         if (code) return code;
     }
     mstmm_point_shown(state, probe, mstmm_zeros, shown);
@@ -197,8 +203,7 @@ static void add_brackets(const mstmm_points *points, const real *u, real *to)
     const int64_t nu = points->at.model->nu;
     const real *jacobian = points->rows, *x = jacobian + 3 * nu, *y = x + nu, *z = y + nu;
     real w[3] = {0};
-    for (int64_t j = 0; j < nu; j++)
-        w[0] += x[j] * u[j], w[1] += y[j] * u[j], w[2] += z[j] * u[j];
+    for (int64_t j = 0; j < nu; j++) w[0] += x[j] * u[j], w[1] += y[j] * u[j], w[2] += z[j] * u[j];
     for (int64_t j = 0; j < nu; j++) {
         to[3 * nu + j] += (w[1] * z[j] - w[2] * y[j]) / 2;
         to[4 * nu + j] += (w[2] * x[j] - w[0] * z[j]) / 2;
@@ -207,8 +212,7 @@ static void add_brackets(const mstmm_points *points, const real *u, real *to)
     for (int n = 0; n < points->n_brackets; n++) {
         const mstmm_bracket *one = &points->brackets[n];
         const real half = u[one->by] * one->value / 2;
-        for (int k = 0; k < 6; k++)
-            to[k * nu + one->column] -= half * jacobian[k * nu + one->row];
+        for (int k = 0; k < 6; k++) to[k * nu + one->column] -= half * jacobian[k * nu + one->row];
     }
 }
 
@@ -222,7 +226,7 @@ static int jacobian_rate(const mstmm_points *points, const mstmm_probe *probe, c
     real size = 1;
     int length = 0, code = 0;
     memset(to, 0, (size_t)(6 * nu) * sizeof(real));
-    if (!moves(points, q, u, &state, &failure)) return 1;
+    if (!run_motion(points, q, u, &state, &failure)) return 1;
     if (added_by_speeds(&state, probe, points->rows)) return 1;
     memcpy(points->speeds, u, (size_t)nu * sizeof(real));
     state.u = points->speeds;

@@ -42,7 +42,7 @@ typedef struct {
     int *way;     /* n_bodies, written over */
 } mstmm_points;
 
-/* Called as in alone.h; the number is ignored.  Positions (n_probes x 3) at q. */
+/* Called as in single_state.h; the number is ignored.  Positions (n_probes x 3) at q. */
 int mstmm_points_places(const void *points, real none, const real *const *rows,
                         real *const *answers);
 /* Transformations (n_probes x 4 x 4) from axes of the points to inertial axes at q. */

@@ -1,5 +1,5 @@
-/* The linear equations of a scene about a state; see linear.h. */
-#include "linear.h"
+/* The linear equations of a scene about a state; see linear_equations.h. */
+#include "linear_equations.h"
 
 #include "is_finite.h"
 #include "four_lanes.h"
@@ -50,7 +50,7 @@ int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, 
 /* M = L^T D L from the last speed to the first, which leaves zeros between branches of a tree what
  * they are (R. Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 6.5).  Below the diagonal
  * `factors` gets L, on it 1 / D. */
-static int factored(int n, const real *restrict mass, real *restrict factors)
+static int factor_mass(int n, const real *restrict mass, real *restrict factors)
 {
     memcpy(factors, mass, (size_t)(n * n) * sizeof(real));
     for (int k = n - 1; k >= 0; k--) {
@@ -77,7 +77,7 @@ typedef struct {
 } columns;
 
 /* The next `width` columns from `first` on, side by side in rows of a tile. */
-static void laid_out(int n, const columns *of, int first, int width, real *tile)
+static void fill_tile(int n, const columns *of, int first, int width, real *tile)
 {
     for (int i = 0; i < n; i++)
         for (int k = 0; k < width; k++)
@@ -85,7 +85,7 @@ static void laid_out(int n, const columns *of, int first, int width, real *tile)
                 of->from ? -of->from[of->width * i + first + k] : (real)(i == first + k);
 }
 
-static void taken_back(int n, const columns *of, int first, int width, const real *tile)
+static void store_tile(int n, const columns *of, int first, int width, const real *tile)
 {
     for (int i = 0; i < n; i++)
         memcpy(of->to + of->stride * i + first, tile + TILE * i, (size_t)width * sizeof(real));
@@ -100,7 +100,7 @@ typedef struct {
 } row;
 _Static_assert(sizeof(row) == TILE * sizeof(real), "a row is as wide as a tile");
 
-MSTMM_INLINE void take_row(row *own, real times, const real *other)
+MSTMM_INLINE void subtract_row(row *own, real times, const real *other)
 {
     const quad factor = {times, times, times, times}, *from = (const quad *)other;
     own->a -= factor * from[0];
@@ -135,29 +135,29 @@ MSTMM_WIDE static void solve_tile(int n, const real *restrict factors, real *res
     for (int j = n - 1; j >= 0; j--) {
         get_row(&own, 1, tile + TILE * j);
         for (int i = n - 1; i > j; i--)
-            if (factors[n * i + j] != 0) take_row(&own, factors[n * i + j], tile + TILE * i);
+            if (factors[n * i + j] != 0) subtract_row(&own, factors[n * i + j], tile + TILE * i);
         put_row(&own, tile + TILE * j);
     }
     for (int i = 0; i < n; i++) {
         get_row(&own, factors[n * i + i], tile + TILE * i);
         for (int j = 0; j < i; j++)
-            if (factors[n * i + j] != 0) take_row(&own, factors[n * i + j], tile + TILE * j);
+            if (factors[n * i + j] != 0) subtract_row(&own, factors[n * i + j], tile + TILE * j);
         put_row(&own, tile + TILE * i);
     }
 }
 
 /* As many columns as a tile holds, laid out there or taken back from it, from column `first` of
  * *all on; returns where the next ones begin. */
-static const columns *moved(int n, const columns *all, const columns *end, int *first, int back,
-                            real *tile)
+static const columns *copy_tile(int n, const columns *all, const columns *end, int *first, int back,
+                                real *tile)
 {
     for (int used = 0; all < end && used < TILE;) {
         const int left = all->width - *first, room = TILE - used;
         const int width = left < room ? left : room;
         if (back)
-            taken_back(n, all, *first, width, tile + used);
+            store_tile(n, all, *first, width, tile + used);
         else
-            laid_out(n, all, *first, width, tile + used);
+            fill_tile(n, all, *first, width, tile + used);
         used += width;
         *first += width;
         if (*first == all->width) all++, *first = 0;
@@ -171,12 +171,12 @@ static int divide_by_mass(int n, const real *mass, int count, const columns *all
     const columns *end = all + count;
     real *tile = work + n * n;
     int first = 0, behind = 0;
-    if (factored(n, mass, work)) return 1;
+    if (factor_mass(n, mass, work)) return 1;
     memset(tile, 0, (size_t)(TILE * n) * sizeof(real));
     while (all < end) {
-        moved(n, all, end, &first, 0, tile);
+        copy_tile(n, all, end, &first, 0, tile);
         solve_tile(n, work, tile);
-        all = moved(n, all, end, &behind, 1, tile);
+        all = copy_tile(n, all, end, &behind, 1, tile);
     }
     return 0;
 }
@@ -205,10 +205,12 @@ int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real 
 {
     const int n = code->n, width = 3 * n + 1;
     const real *M = found + code->fused->nu, *C = M + n * n, *K = C + n * n, *r_t = K + 2 * n * n;
-    const columns all[] = {{K, n, width, slopes}, {C, n, width, slopes + n},
-                           {NULL, n, width, slopes + 2 * n}, {r_t, 1, width, slopes + 3 * n}};
-    return mstmm_linear_at(code, t, q, u, efforts, found)
-           || divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n * width, slopes);
+    const columns all[] = {{K, n, width, slopes},
+                           {C, n, width, slopes + n},
+                           {NULL, n, width, slopes + 2 * n},
+                           {r_t, 1, width, slopes + 3 * n}};
+    return mstmm_linear_at(code, t, q, u, efforts, found) ||
+           divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n * width, slopes);
 }
 
 int mstmm_linear_derivatives(const void *record, real t, const real *const *rows,
@@ -218,10 +220,12 @@ int mstmm_linear_derivatives(const void *record, real t, const real *const *rows
     const mstmm_linear_code *code = &alone->code;
     const int n = code->n, nu = code->fused->nu, square = n * n;
     const real *M = alone->found + nu, *C = M + square, *K = C + square, *G = K + square;
-    const columns all[] = {{K, n, n, answers[1]}, {C, n, n, answers[2]}, {NULL, n, n, answers[3]},
+    const columns all[] = {{K, n, n, answers[1]},
+                           {C, n, n, answers[2]},
+                           {NULL, n, n, answers[3]},
                            {G + square, 1, 1, answers[4]}};
-    int failed = mstmm_linear_at(code, t, rows[0], rows[1], alone->efforts, alone->found)
-                 || divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n, answers[4]);
+    int failed = mstmm_linear_at(code, t, rows[0], rows[1], alone->efforts, alone->found) ||
+                 divide_by_mass(n, M, 4, all, code->work) || !mstmm_finite(n, answers[4]);
     for (int k = 1; !failed && k < 4; k++) failed = !mstmm_finite(square, answers[k]);
     if (failed) return 1;
     memcpy(answers[0], alone->found, (size_t)nu * sizeof(real));

@@ -39,8 +39,14 @@ static int continues(const mstmm_model *model, const mstmm_branch *run, const in
 static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **numbers, int i)
 {
     const mstmm_body *body = &model->bodies[i];
-    *run = (mstmm_branch){.first = i, .parent = body->parent, .q = body->q, .u = body->u,
-                       .nq = body->nq, .nu = body->nu, .place = -1, .parent_place = -1};
+    *run = (mstmm_branch){.first = i,
+                          .parent = body->parent,
+                          .q = body->q,
+                          .u = body->u,
+                          .nq = body->nq,
+                          .nu = body->nu,
+                          .place = -1,
+                          .parent_place = -1};
     if (!body->kernels->link_condense) return;
     run->numbers = numbers + i;
     run->angles = body->kernels->link_angles;
@@ -52,7 +58,7 @@ static void begin_run(const mstmm_model *model, mstmm_branch *run, const real **
 
 /* A run that is the only child of the previous run passes S and e on to it if both consist of
  * links. */
-static void join(mstmm_branch *before, mstmm_branch *run)
+static void join_runs(mstmm_branch *before, mstmm_branch *run)
 {
     if (!before->numbers || !run->numbers) return;
     run->joined = 1;
@@ -66,7 +72,7 @@ static int64_t link_size(const mstmm_branch *run)
 }
 
 /* Run that contains a body; the runs are in the order of the bodies. */
-static const mstmm_branch *run_of(const mstmm_branch *runs, int n, int body)
+static const mstmm_branch *find_run(const mstmm_branch *runs, int n, int body)
 {
     int low = 0, high = n;
     while (high - low > 1) {
@@ -93,7 +99,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
             begin_run(model, &runs[n++], numbers, i);
         mstmm_branch *run = &runs[n - 1];
         if (run->count++ == 0 && n > 1 && run->parent == i - 1 && children[i - 1] == 1)
-            join(run - 1, run);
+            join_runs(run - 1, run);
         run->open = children[i] > 0;
     }
     for (int k = 0; k < n; k++) {
@@ -103,7 +109,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
             place += run->count * link_size(run);
         }
         if (run->parent < 0) continue;
-        const mstmm_branch *outer = run_of(runs, n, run->parent);
+        const mstmm_branch *outer = find_run(runs, n, run->parent);
         if (outer->numbers)
             run->parent_place = outer->place + (run->parent - outer->first) * link_size(outer);
     }
@@ -123,7 +129,7 @@ int mstmm_fill_runs(const mstmm_model *model, mstmm_branch *runs, const real **n
 /* --- passes ----------------------------------------------------------------------------------- */
 
 /* Bias motion or deviation of the parent of a run: a link, or a body's or the ground's block. */
-static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, int in_block)
+static const real *parent_numbers(const mstmm_state *state, const mstmm_branch *run, int in_block)
 {
     return run->parent_place >= 0
                ? state->workspace + run->parent_place + MSTMM_LINK_MOTION
@@ -134,8 +140,13 @@ static const real *of_parent(const mstmm_state *state, const mstmm_branch *run, 
 MSTMM_INLINE mstmm_link_at link_at(mstmm_state *state, const mstmm_branch *run, int k)
 {
     return (mstmm_link_at){
-        .state = state, .index = run->first + k, .nu = run->nu, .turn = run->turn,
-        .forward = run->forward, .condense = run->condense, .recover = run->recover,
+        .state = state,
+        .index = run->first + k,
+        .nu = run->nu,
+        .turn = run->turn,
+        .forward = run->forward,
+        .condense = run->condense,
+        .recover = run->recover,
         .link = state->workspace + run->place + k * link_size(run),
         .q = state->q + run->q + (int64_t)k * run->nq,
         .u = state->u + run->u + (int64_t)k * run->nu,
@@ -179,7 +190,7 @@ static int forward_links(mstmm_state *state, const mstmm_branch *run)
     if (run->angles) turn_links(state, run);
     const int64_t size = link_size(run);
     mstmm_link_at at = link_at(state, run, 0);
-    at.outer_motion = of_parent(state, run, MSTMM_BLOCK_MOTION);
+    at.outer_motion = parent_numbers(state, run, MSTMM_BLOCK_MOTION);
     for (int k = 0; k < run->count; k++, at.index++) {
         at.numbers = run->numbers[k];
         if (!run->angles) mstmm_at_link_turn(at);
@@ -208,7 +219,7 @@ int mstmm_hook_links_forward(mstmm_state *state)
             if (code) return code;
             continue;
         }
-        const real *parent = of_parent(state, run, MSTMM_BLOCK_MOTION);
+        const real *parent = parent_numbers(state, run, MSTMM_BLOCK_MOTION);
         for (int i = run->first; i < run->first + run->count; i++) {
             const int code = mstmm_at_forward(state, i, parent);
             if (code) return code;
@@ -219,7 +230,7 @@ int mstmm_hook_links_forward(mstmm_state *state)
 }
 
 /* Efforts on the hinge of a run's body k. */
-static const real *efforts_of(const mstmm_state *state, const mstmm_branch *run, int k)
+static const real *link_efforts(const mstmm_state *state, const mstmm_branch *run, int k)
 {
     const mstmm_model *model = state->model;
     if (model->n_laws)
@@ -241,13 +252,13 @@ static int condense_links(mstmm_state *state, const mstmm_branch *run, carried_t
     const int last = run->first + run->count - 1;
     mstmm_link_at at = link_at(state, run, run->count - 1);
     at.inner = carried->handed ? carried->handed
-               : run->open ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
-                           : mstmm_zeros;
+               : run->open     ? mstmm_block(state->model, state->workspace, last) + MSTMM_BLOCK_S
+                               : mstmm_zeros;
     for (int k = run->count - 1; k >= 0; k--, at.link -= size, at.index--) {
         at.numbers = run->numbers[k];
         at.outer = carried->numbers[carried->next];
         carried->next = !carried->next;
-        at.tau = efforts_of(state, run, k);
+        at.tau = link_efforts(state, run, k);
         const int code = mstmm_at_link_condense(at);
         if (code) return code;
         at.inner = at.outer;
@@ -277,7 +288,7 @@ static void recover_links(mstmm_state *state, const mstmm_branch *run)
 {
     const int64_t size = link_size(run);
     mstmm_link_at at = link_at(state, run, 0);
-    at.outer_delta = of_parent(state, run, MSTMM_BLOCK_DELTA);
+    at.outer_delta = parent_numbers(state, run, MSTMM_BLOCK_DELTA);
     for (int k = 0; k < run->count; k++) {
         at.numbers = run->numbers[k];
         mstmm_at_link_recover(at);
@@ -296,7 +307,7 @@ int mstmm_hook_links_recover(mstmm_state *state)
             recover_links(state, run);
             continue;
         }
-        const real *parent = of_parent(state, run, MSTMM_BLOCK_DELTA);
+        const real *parent = parent_numbers(state, run, MSTMM_BLOCK_DELTA);
         for (int i = run->first; i < run->first + run->count; i++) {
             const int code = mstmm_at_recover(state, i, parent);
             if (code) return code;

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "loops.h"
+#include "loop_closure.h"
 #include "sweep.h"
 #include "sweep_steps.h"
 
@@ -21,7 +21,7 @@ static real *row_numbers(const mstmm_state *state, int row)
 }
 
 /* True if a row is inactive now. */
-static int let_go(const mstmm_state *state, const mstmm_loop_row *row)
+static int is_released(const mstmm_state *state, const mstmm_loop_row *row)
 {
     if (row->of_speeds && state->level == MSTMM_GAP) return 1;
     return row->release >= 0 && fabs(state->memory[row->release]) > 0;
@@ -42,10 +42,9 @@ int mstmm_hook_rows_begun(mstmm_state *state)
     memset(first, 0, (size_t)(end - first) * sizeof(real));
     for (int r = 0; r < model->n_rows; r++) {
         const mstmm_loop_row *row = &model->rows[r];
-        row_numbers(state, r)[MSTMM_ROW_PIVOT] =
-            let_go(state, row) || mstmm_rests(state, row)
-                ? (real)INFINITY
-                : row->softness + state->give * row->mobility;
+        row_numbers(state, r)[MSTMM_ROW_PIVOT] = is_released(state, row) || mstmm_rests(state, row)
+                                                     ? (real)INFINITY
+                                                     : row->softness + state->give * row->mobility;
     }
     return model->n_couplings ? mstmm_hook_couplings_valued(state) : 0;
 }
@@ -60,8 +59,14 @@ int mstmm_hook_rows_asked(mstmm_state *state)
 int mstmm_stressed(const mstmm_model *model, real *workspace, real give, const real *asked,
                    const real *q, const real *memory, real *multipliers, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .q = q, .memory = memory,
-                         .observed = 1, .level = MSTMM_SLIP, .give = give, .asked = asked,
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .q = q,
+                         .memory = memory,
+                         .observed = 1,
+                         .level = MSTMM_SLIP,
+                         .give = give,
+                         .asked = asked,
                          .failure = failure};
     real *still = mstmm_spare_udot(&state);
     memset(still, 0, (size_t)model->nu * sizeof(real));
@@ -96,20 +101,38 @@ int mstmm_placing_accelerations(const mstmm_model *model, real *workspace, real 
                                 const real *q, const real *u, const real *a, const real *memory,
                                 real *qdot, real *found, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .given = a, .qdot = qdot, .udot = found,
-                         .failure = failure, .closing = closing, .residual = 1, .refined = 1};
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .q = q,
+                         .u = u,
+                         .memory = memory,
+                         .given = a,
+                         .qdot = qdot,
+                         .udot = found,
+                         .failure = failure,
+                         .closing = closing,
+                         .residual = 1,
+                         .refined = 1};
     mstmm_ground(&state);
     return mstmm_run_accelerations(&state);
 }
 
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
-                     const real *q, const real *u, const real *memory, real *change,
-                     real *missing, mstmm_failure *failure)
+                     const real *q, const real *u, const real *memory, real *change, real *missing,
+                     mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .udot = change, .observed = 0, .level = level,
-                         .give = give, .failure = failure};
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .q = q,
+                         .u = u,
+                         .memory = memory,
+                         .udot = change,
+                         .observed = 0,
+                         .level = level,
+                         .give = give,
+                         .failure = failure};
     memset(change, 0, (size_t)model->nu * sizeof(real));
     state.given = change; /* only constant values are prescribed */
     state.qdot = mstmm_spare_qdot(&state);
@@ -135,8 +158,7 @@ void mstmm_missing(const mstmm_state *state, real *missing)
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_closure *closure = model->looped[i].closure;
         if (!closure) continue;
-        const real *known =
-            state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
+        const real *known = state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
         for (int c = 0; c < 6; c++)
             if (closure->rows[c] >= 0) missing[closure->rows[c]] = known[c];
     }
@@ -148,8 +170,14 @@ void mstmm_missing(const mstmm_state *state, real *missing)
 int mstmm_fill_driven(const mstmm_model *model, real *workspace, real t, real *q, real *u,
                       const real *memory, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .observed = 1, .failure = failure};
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .q = q,
+                         .u = u,
+                         .memory = memory,
+                         .observed = 1,
+                         .failure = failure};
     if (!model->n_drives) return 0;
     const int code = mstmm_run_given(&state);
     if (code) return code;
@@ -162,8 +190,14 @@ int mstmm_moved(const mstmm_model *model, real *workspace, real t, real *q, cons
                 const real *memory, int n_quaternions, const int *quaternions,
                 mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = change,
-                         .memory = memory, .observed = 1, .failure = failure};
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .q = q,
+                         .u = change,
+                         .memory = memory,
+                         .observed = 1,
+                         .failure = failure};
     real *qdot = mstmm_spare_qdot(&state);
     state.qdot = qdot;
     mstmm_ground(&state);
@@ -182,8 +216,8 @@ void mstmm_unit_quaternions(int count, const int *first, real *q)
 {
     for (int k = 0; k < count; k++) {
         real *unit = q + first[k];
-        const real norm = sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2] +
-                               unit[3] * unit[3]);
+        const real norm =
+            sqrt(unit[0] * unit[0] + unit[1] * unit[1] + unit[2] * unit[2] + unit[3] * unit[3]);
         for (int j = 0; j < 4; j++) unit[j] /= norm;
     }
 }
@@ -191,20 +225,19 @@ void mstmm_unit_quaternions(int count, const int *first, real *q)
 /* Largest of what the rows lack that have a multiplier, and own speeds of hinges that close; where
  * `repeated`, of what the others lack: they say what some of these say, and follow by themselves.
  * *where is the frame of its hinge, or the number of a coupling behind those of all bodies. */
-static real largest(const mstmm_state *state, int repeated, int *where)
+static real largest_row_error(const mstmm_state *state, int repeated, int *where)
 {
     const mstmm_model *model = state->model;
     real found = 0;
     for (int i = 0; i < model->n_bodies; i++) {
         const mstmm_closure *closure = model->looped[i].closure;
         if (!closure) continue;
-        const real *known =
-            state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
+        const real *known = state->workspace + model->loops + closure->numbers + MSTMM_CLOSURE_L;
         for (int c = 0; c < 6; c++) {
             const int row = closure->rows[c];
-            if (row < -1 || (row >= 0 && let_go(state, &model->rows[row]))) continue;
-            const int counts = row >= 0 ? row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0
-                                        : c < model->bodies[i].nu;
+            if (row < -1 || (row >= 0 && is_released(state, &model->rows[row]))) continue;
+            const int counts =
+                row >= 0 ? row_numbers(state, row)[MSTMM_ROW_INVERSE] > 0 : c < model->bodies[i].nu;
             if (counts == repeated || fabs(known[c]) <= found) continue;
             found = fabs(known[c]);
             *where = i;
@@ -213,8 +246,7 @@ static real largest(const mstmm_state *state, int repeated, int *where)
     for (int k = 0; k < model->n_couplings; k++) {
         const mstmm_coupling *one = &model->couplings[k];
         const real lack = fabs(mstmm_coupling_lack(state, one));
-        const int counts =
-            one->row >= 0 && row_numbers(state, one->row)[MSTMM_ROW_INVERSE] > 0;
+        const int counts = one->row >= 0 && row_numbers(state, one->row)[MSTMM_ROW_INVERSE] > 0;
         if (counts == repeated || lack <= found) continue;
         found = lack;
         *where = model->n_bodies + k;
@@ -235,13 +267,13 @@ typedef struct {
 static int looped_gaps(void *context, mstmm_gaps *found)
 {
     const looped_state *at = context;
-    const mstmm_state state = {.model = at->model, .workspace = at->workspace,
-                               .memory = at->memory, .level = MSTMM_GAP};
+    const mstmm_state state = {
+        .model = at->model, .workspace = at->workspace, .memory = at->memory, .level = MSTMM_GAP};
     int code = mstmm_correction(at->model, at->workspace, MSTMM_GAP, 0, at->t, at->q, at->u,
                                 at->memory, at->change, NULL, at->failure);
     if (code) return code;
-    found->met = largest(&state, 0, &found->where_met);
-    found->repeated = largest(&state, 1, &found->where_repeated);
+    found->met = largest_row_error(&state, 0, &found->where_met);
+    found->repeated = largest_row_error(&state, 1, &found->where_repeated);
     return mstmm_moved(at->model, at->workspace, at->t, at->q, at->change, at->memory,
                        at->n_quaternions, at->quaternions, at->failure);
 }
@@ -279,12 +311,12 @@ int mstmm_closed(const mstmm_closing *by, const mstmm_model *model, mstmm_failur
 }
 
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
-                      const real *memory, int n_quaternions, const int *quaternions,
-                      int gaps_alone, mstmm_failure *failure)
+                      const real *memory, int n_quaternions, const int *quaternions, int gaps_alone,
+                      mstmm_failure *failure)
 {
     const mstmm_state state = {.model = model, .workspace = workspace};
-    looped_state at = {model, workspace, q, u, mstmm_spare_udot(&state), t, memory, n_quaternions,
-                       quaternions, failure};
+    looped_state at = {model,  workspace,     q,           u,      mstmm_spare_udot(&state), t,
+                       memory, n_quaternions, quaternions, failure};
     const int near = model->strained >= 0 && memory[model->strained] > 0;
     const mstmm_closing by = {&at, looped_gaps, gaps_alone ? NULL : looped_slips, near};
     return mstmm_closed(&by, model, failure);

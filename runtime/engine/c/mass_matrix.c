@@ -11,8 +11,7 @@ static int row_of_speed(mstmm_state *state, int body, int speed, real *matrix)
     const int64_t nu = state->model->nu;
     int code;
     for (int i = body; i >= 0; i = bodies[i].parent)
-        memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0,
-               6 * sizeof(real));
+        memset(mstmm_block(state->model, state->workspace, i) + MSTMM_BLOCK_E, 0, 6 * sizeof(real));
     if ((code = mstmm_at_exerted(state, body))) return code;
     for (int i = body; i >= 0; i = bodies[i].parent) {
         if ((code = mstmm_at_felt_by(state, i))) return code;
@@ -24,12 +23,12 @@ static int row_of_speed(mstmm_state *state, int body, int speed, real *matrix)
     return 0;
 }
 
-int mstmm_mass_matrix(const mstmm_model *model, real *workspace, const real *q,
-                      const real *memory, real *matrix, real *work, mstmm_failure *failure)
+int mstmm_mass_matrix(const mstmm_model *model, real *workspace, const real *q, const real *memory,
+                      real *matrix, real *work, mstmm_failure *failure)
 {
     const int64_t nu = model->nu;
-    mstmm_state state = {.model = model, .workspace = workspace, .memory = memory, .q = q,
-                         .failure = failure};
+    mstmm_state state = {
+        .model = model, .workspace = workspace, .memory = memory, .q = q, .failure = failure};
     real *still = mstmm_filled_u(&state), *unit = work;
     memset(still, 0, (size_t)nu * sizeof(real));
     memset(unit, 0, (size_t)nu * sizeof(real));

@@ -1,27 +1,66 @@
 /* Loads and efforts that couple distant bodies, and closing hinges, in addition to the tangent's
- * elimination along the tree; see across.h. */
-#include "across.h"
+ * elimination along the tree; see off_tree_coupling.h. */
+#include "off_tree_coupling.h"
 
 #include "sweep_steps.h"
 
 /* Smallest pivot relative to its column. */
 #define NO_PIVOT 1e-13
 
+/* --- rows and own accelerations of closing hinges --- */
+
+static int64_t row_place(const mstmm_model *model, const mstmm_coupled_row *one)
+{
+    if (one->frame < 0) return model->loops + MSTMM_ROW * (int64_t)one->row + MSTMM_ROW_KNOWN;
+    const mstmm_closure *closure = model->looped[one->frame].closure;
+    return model->loops + closure->numbers + MSTMM_CLOSURE_L + one->direction;
+}
+
+void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own)
+{
+    memcpy(own, a, (size_t)at->model->nu * sizeof(real));
+    for (int k = 0; k < at->couplings->n_rows; k++)
+        if (at->couplings->rows[k].speed >= 0) a[at->couplings->rows[k].speed] = 0;
+}
+
+/* Residual; for a rotor its inertia times its acceleration minus the multiplier. */
+void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows)
+{
+    const mstmm_model *model = at->model;
+    for (int k = 0; k < at->couplings->n_rows; k++) {
+        const mstmm_coupled_row *one = &at->couplings->rows[k];
+        const real softness = one->row < 0 ? 0 : model->rows[one->row].softness;
+        if (softness > 0)
+            rows[k] = own[model->bodies[one->frame].u + one->direction] -
+                      softness * mstmm_row_numbers(model, workspace, one->row)[MSTMM_ROW_X];
+        else
+            rows[k] = workspace[row_place(model, one)] - (one->speed < 0 ? 0 : own[one->speed]);
+    }
+}
+
+void mstmm_keep_multipliers(const mstmm_model *model, real *workspace)
+{
+    for (int r = 0; r < model->n_rows; r++) mstmm_row_numbers(model, workspace, r)[MSTMM_ROW_X] = 0;
+}
+
+void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own, real *required)
+{
+    for (int k = 0; at->model->looped && k < at->couplings->n_rows; k++) {
+        const mstmm_coupled_row *one = &at->couplings->rows[k];
+        if (one->speed >= 0)
+            required[one->speed] = own[one->speed] - workspace[row_place(at->model, one)];
+    }
+}
+
 /* --- unknowns --- */
 
 /* Number of unknown changes of loads and efforts; rows of closing hinges follow them. */
-static int n_changes(const mstmm_tangent *at)
-{
-    return at->n_coupled - at->couplings->n_rows;
-}
+static int n_changes(const mstmm_tangent *at) { return at->n_coupled - at->couplings->n_rows; }
 
 /* Entries of a list that are of pass or group k (-1: none). */
-static int first_of(const int *firsts, int k)
-{
-    return k < 0 ? 0 : firsts[k];
-}
+static int first_in_list(const int *firsts, int k) { return k < 0 ? 0 : firsts[k]; }
 
-static int end_of(const int *firsts, int k)
+static int end_of_list(const int *firsts, int k)
 {
     return firsts[k + 1]; /* none before the first */
 }
@@ -38,7 +77,7 @@ static int is_unknown(const mstmm_tangent *at, int k)
 }
 
 /* Change number k of loads and efforts, in the derivatives' workspace. */
-static real *change_across(const mstmm_tangent *at, const mstmm_state *slope, int k)
+static real *change_place(const mstmm_tangent *at, const mstmm_state *slope, int k)
 {
     const mstmm_couplings *all = at->couplings;
     const mstmm_model *model = at->model;
@@ -56,21 +95,22 @@ static int multiplier(const mstmm_tangent *at, int k)
 }
 
 /* Changes along the direction in `parts`, and by one of the multipliers of a pass (-1: of none). */
-static int changes_of(mstmm_tangent *at, const mstmm_parts *parts, int pass, real *changes)
+static int direction_changes(mstmm_tangent *at, const mstmm_parts *parts, int pass, real *changes)
 {
     const mstmm_couplings *all = at->couplings;
-    mstmm_state state = known_state(at, parts), slope = slope_of(at, parts, parts->required);
+    mstmm_state state = known_state(at, parts), slope = tangent_slope(at, parts, parts->required);
     state.slope = &slope;
     memset(slope.workspace, 0, MSTMM_BLOCK_FIXED * sizeof(real));
     mstmm_set_own_apart(at, parts->d_a, parts->answer);
     mstmm_keep_multipliers(at->model, slope.workspace);
-    for (int s = first_of(all->first_seed, pass); s < end_of(all->first_seed, pass); s++) {
+    for (int s = first_in_list(all->first_seed, pass); s < end_of_list(all->first_seed, pass);
+         s++) {
         const int row = multiplier(at, all->seed[s]);
         if (row >= 0 && is_unknown(at, all->seed[s]))
             mstmm_row_numbers(at->model, slope.workspace, row)[MSTMM_ROW_X] = 1;
     }
     const int code = mstmm_run_applied_slope(&state);
-    for (int k = 0; !code && k < n_changes(at); k++) changes[k] = *change_across(at, &slope, k);
+    for (int k = 0; !code && k < n_changes(at); k++) changes[k] = *change_place(at, &slope, k);
     if (!code) mstmm_rows_along(at, slope.workspace, parts->answer, changes + n_changes(at));
     return code;
 }
@@ -85,12 +125,12 @@ static int changes_at_end(mstmm_tangent *at, const mstmm_parts *parts, const rea
     memcpy(parts->still_efforts, parts->d_a, speeds);
     for (int j = 0; at->rows_of_motion && j < at->model->nu; j++)
         parts->still_efforts[j] = (1 + at->s) * x[j];
-    int code = changes_of(at, parts, pass, changes);
+    int code = direction_changes(at, parts, pass, changes);
     memcpy(loads, changes, (size_t)n_changes(at) * sizeof(real));
     memset(parts->d_q, 0, (size_t)at->model->nq * sizeof(real));
     memset(parts->d_u, 0, speeds);
     memcpy(parts->d_a, parts->still_efforts, speeds);
-    if (!code) code = changes_of(at, parts, pass, changes);
+    if (!code) code = direction_changes(at, parts, pass, changes);
     memcpy(changes, loads, (size_t)n_changes(at) * sizeof(real));
     return code;
 }
@@ -100,7 +140,7 @@ static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
                          real *changes)
 {
     const mstmm_model *model = at->model;
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     const int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
     if (code) return code;
     memcpy(parts.d_q, parts.change, (size_t)model->nq * sizeof(real));
@@ -111,19 +151,19 @@ static int changes_along(mstmm_tangent *at, const real *x, const mstmm_known *kn
     for (int i = 0; known && i < model->nq; i++) parts.d_q[i] += known->q[i];
     for (int j = 0; known && j < model->nu; j++) parts.d_a[j] += known->a[j];
     return at->on_positions || at->rows_of_motion ? changes_at_end(at, &parts, x, pass, changes)
-                                                  : changes_of(at, &parts, pass, changes);
+                                                  : direction_changes(at, &parts, pass, changes);
 }
 
 int mstmm_coupled_along(mstmm_tangent *at, const real *x, const real *d_u, const real *d_a,
                         real *changes)
 {
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     const int code = mstmm_tangent_coordinates(at, x, NULL, parts.change);
     if (code) return code;
     memcpy(parts.d_q, parts.change, (size_t)at->model->nq * sizeof(real));
     memcpy(parts.d_u, d_u, (size_t)at->model->nu * sizeof(real));
     memcpy(parts.d_a, d_a, (size_t)at->model->nu * sizeof(real));
-    return changes_of(at, &parts, -1, changes);
+    return direction_changes(at, &parts, -1, changes);
 }
 
 /* --- solutions of the tree only --- */
@@ -140,21 +180,24 @@ static void set_efforts(const mstmm_tangent *at, int pass, real value, real *col
 {
     const mstmm_couplings *all = at->couplings;
     const int loads = 6 * all->n_bodies;
-    for (int s = first_of(all->first_seed, pass); s < end_of(all->first_seed, pass); s++)
+    for (int s = first_in_list(all->first_seed, pass); s < end_of_list(all->first_seed, pass); s++)
         if (all->seed[s] >= loads && all->seed[s] < n_changes(at))
             column[all->speeds[all->seed[s] - loads]] = value;
 }
 
 /* Solution x for r with known increments (NULL: none), and for a unit of each change of a pass (-1:
  * none). */
-static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *known, int pass,
-                       real *x)
+static int solve_tree(mstmm_tangent *at, const real *r, const mstmm_known *known, int pass, real *x)
 {
-    const mstmm_parts parts = parts_of(at);
+    const mstmm_parts parts = tangent_parts(at);
     const mstmm_couplings *all = at->couplings;
-    mstmm_tangents step = {.numbers = at->numbers, .rate = at->rate, .s = at->s, .sq = at->sq,
-                           .kappa = at->kappa, .kept = at->kept};
-    mstmm_state state = known_state(at, &parts), slope = slope_of(at, &parts, parts.answer);
+    mstmm_tangents step = {.numbers = at->numbers,
+                           .rate = at->rate,
+                           .s = at->s,
+                           .sq = at->sq,
+                           .kappa = at->kappa,
+                           .kept = at->kept};
+    mstmm_state state = known_state(at, &parts), slope = tangent_slope(at, &parts, parts.answer);
     state.slope = &slope;
     state.tangents = &step;
     state.column = r;
@@ -173,20 +216,19 @@ static int solve_alone(mstmm_tangent *at, const real *r, const mstmm_known *know
     /* Hinges that close loops are no part of the tree. */
     for (int i = 0; i < all->n_rows; i++)
         if (all->rows[i].speed >= 0) x[all->rows[i].speed] = 0;
-    const int code =
-        known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
+    const int code = known ? mstmm_run_tangent_beyond(&state) : mstmm_run_tangent_solution(&state);
     set_efforts(at, pass, 0, parts.column);
     return code;
 }
 
 /* Solution of the tree for a unit of each unknown of a pass, and the resulting changes. */
-static int answer_to(mstmm_tangent *at, int pass, real *x, real *changes)
+static int unit_solution(mstmm_tangent *at, int pass, real *x, real *changes)
 {
     const mstmm_couplings *all = at->couplings;
     const int first = n_changes(at), *seeds = all->seed + all->first_seed[pass];
     memset(x, 0, (size_t)at->model->nu * sizeof(real));
     if (seeds[0] < first) { /* loads and efforts stand before the rest */
-        const int code = solve_alone(at, parts_of(at).column, NULL, pass, x);
+        const int code = solve_tree(at, tangent_parts(at).column, NULL, pass, x);
         if (code) return code;
     }
     for (int s = 0; s < all->first_seed[pass + 1] - all->first_seed[pass]; s++)
@@ -198,7 +240,7 @@ static int answer_to(mstmm_tangent *at, int pass, real *x, real *changes)
 /* --- all together --- */
 
 /* True if a pass contains an unknown. */
-static int asks(const mstmm_tangent *at, int pass)
+static int has_unknown(const mstmm_tangent *at, int pass)
 {
     const mstmm_couplings *all = at->couplings;
     for (int s = all->first_seed[pass]; s < all->first_seed[pass + 1]; s++)
@@ -225,11 +267,11 @@ int mstmm_across_factor(mstmm_tangent *at, int negative)
     const mstmm_couplings *all = at->couplings;
     const mstmm_band matrix = mstmm_across_band(at);
     real *changes = mstmm_across_changes(at), *exchanges = mstmm_across_exchanges(at);
-    memset(parts_of(at).column, 0, (size_t)at->model->nu * sizeof(real));
+    memset(tangent_parts(at).column, 0, (size_t)at->model->nu * sizeof(real));
     memset(matrix.a, 0, (size_t)(matrix.n * matrix.width) * sizeof(real));
     for (int pass = 0; pass < all->n_passes; pass++) {
         real *answer = at->answers + (int64_t)pass * at->model->nu;
-        const int code = asks(at, pass) ? answer_to(at, pass, answer, changes) : 0;
+        const int code = has_unknown(at, pass) ? unit_solution(at, pass, answer, changes) : 0;
         if (code) return code;
         for (int s = all->first_seed[pass]; s < all->first_seed[pass + 1]; s++)
             set_column(at, &matrix, all->seed[s], changes);
@@ -241,7 +283,7 @@ int mstmm_across_factor(mstmm_tangent *at, int negative)
 }
 
 /* Adds the unit solutions times the unknowns, in the order of the matrix. */
-static void add_answers(const mstmm_tangent *at, const real *amounts, real *x)
+static void add_unit_solutions(const mstmm_tangent *at, const real *amounts, real *x)
 {
     const mstmm_couplings *all = at->couplings;
     for (int pass = 0; pass < all->n_passes; pass++) {
@@ -261,12 +303,7 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
     const mstmm_band matrix = mstmm_across_band(at);
     const int m = at->n_coupled, first = n_changes(at);
     real *changes = mstmm_across_changes(at), *amounts = mstmm_across_ordered(at);
-    int code = 0;
-    if (known && !at->kept) { /* first call with known increments: more will follow */
-        at->keeps = 1;
-        code = mstmm_tangent_factor(at, at->rate, at->s, at->sq, at->kappa);
-    }
-    if (!code) code = solve_alone(at, r, known, -1, x);
+    int code = solve_tree(at, r, known, -1, x);
     if (code || !m) return code;
     code = changes_along(at, x, known, -1, changes);
     if (code) return code;
@@ -275,6 +312,6 @@ int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *know
         amounts[at->couplings->rank[k]] = is_unknown(at, k) ? changes[k] - lacks : 0;
     }
     mstmm_band_solve(&matrix, mstmm_across_exchanges(at), amounts);
-    add_answers(at, amounts, x);
+    add_unit_solutions(at, amounts, x);
     return 0;
 }

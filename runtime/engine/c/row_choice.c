@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "loops.h"
+#include "loop_closure.h"
 #include "sweep.h"
 #include "sweep_steps.h"
 
@@ -31,13 +31,14 @@ static void scaled_entries(const mstmm_state *state, const mstmm_choice *one, re
         scale[i] = isfinite(own) && mobility > 0 ? 1 / sqrt(mobility) : 0;
         found[i][i] = isfinite(own) ? own * scale[i] * scale[i] : 0;
         for (int j = 0; j < i; j++)
-            found[i][j] = found[j][i] = loops[one->pairs[i * (i - 1) / 2 + j]] * scale[i] * scale[j];
+            found[i][j] = found[j][i] =
+                loops[one->pairs[i * (i - 1) / 2 + j]] * scale[i] * scale[j];
     }
 }
 
 /* So many of the rows that `met` marks, by the largest pivots; the others are no longer marked.
  * Returns the smallest of these pivots. */
-static real pivoted(int n, int count, real (*entries)[MOST], int *met)
+static real select_largest_pivots(int n, int count, real (*entries)[MOST], int *met)
 {
     real left[MOST][MOST], smallest = INFINITY;
     int open[MOST];
@@ -61,7 +62,7 @@ static real pivoted(int n, int count, real (*entries)[MOST], int *met)
 }
 
 /* The first so many independent rows, in the order in which they are closed. */
-static void in_order(int n, int count, real (*entries)[MOST], int *met)
+static void select_first_independent(int n, int count, real (*entries)[MOST], int *met)
 {
     real left[MOST][MOST];
     memcpy(left, entries, sizeof left);
@@ -79,7 +80,7 @@ static int is_resting(const mstmm_state *state, int row)
     return state->memory[state->model->rows[row].rest] > 0;
 }
 
-static void choose(mstmm_state *state, const mstmm_choice *one)
+static void choose_independent_rows(mstmm_state *state, const mstmm_choice *one)
 {
     const mstmm_model *model = state->model;
     real entries[MOST][MOST] = {{0}};
@@ -89,10 +90,10 @@ static void choose(mstmm_state *state, const mstmm_choice *one)
         now[i] = !is_resting(state, one->rows[i]);
         known |= !now[i];
     }
-    const real most = pivoted(one->n, one->count, entries, best);
-    if (!known) in_order(one->n, one->count, entries, now);
+    const real most = select_largest_pivots(one->n, one->count, entries, best);
+    if (!known) select_first_independent(one->n, one->count, entries, now);
     const real least = known || state->chosen ? WORSE : BAD;
-    int stays = pivoted(one->n, one->count, entries, now) > least * most;
+    int stays = select_largest_pivots(one->n, one->count, entries, now) > least * most;
     if (known) stays |= most < REPEATED;
     const int *met = stays ? now : best;
     for (int i = 0; i < one->n; i++) {
@@ -109,7 +110,7 @@ const real *mstmm_row_floor(mstmm_state *state, const mstmm_loop_row *row)
     const mstmm_choice *one = row->choice;
     int known = 0;
     for (int i = 0; one && i < one->n; i++) known |= is_resting(state, one->rows[i]);
-    if (one && (state->chosen || !known)) choose(state, one);
+    if (one && (state->chosen || !known)) choose_independent_rows(state, one);
     return &row->floor;
 }
 
@@ -121,8 +122,13 @@ int mstmm_rests(const mstmm_state *state, const mstmm_loop_row *row)
 int mstmm_choose_rows(const mstmm_model *model, real *workspace, real t, const real *q,
                       real *memory, int *changed, mstmm_failure *failure)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q,
-                         .memory = memory, .level = MSTMM_SLIP, .failure = failure,
+    mstmm_state state = {.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .q = q,
+                         .memory = memory,
+                         .level = MSTMM_SLIP,
+                         .failure = failure,
                          .chosen = memory};
     *changed = 0;
     if (!model->n_choices) return 0;

@@ -26,9 +26,9 @@ typedef struct {
     real *points;  /* n_probes x MSTMM_PROBE_NUMBERS, or NULL */
     real *loads; /* n_bodies x 6: force and moment of each inboard hinge, inertial axes, or NULL */
     real *efforts; /* nu: H^T f + J udot, what laws and drives put in, or NULL */
-    real *udot;    /* nu, or NULL */
-    real *sums;    /* MSTMM_SUM_NUMBERS, or NULL */
-    real *rows;    /* n_rows: multipliers of closed loops, or NULL */
+    real *udot; /* nu, or NULL */
+    real *sums; /* MSTMM_SUM_NUMBERS, or NULL */
+    real *rows; /* n_rows: multipliers of closed loops, or NULL */
 } mstmm_observation;
 
 /* All requested quantities at one state; returns 0 or a reason, with `failure` filled. */
@@ -45,9 +45,8 @@ int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n,
                            real *energies, mstmm_failure *failure);
 /* Accelerations of n states one after the other. */
 int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
-                             const real *q, const real *u, const real *memory,
-                             const real *efforts, real *qdot, real *udot, mstmm_failure *failure,
-                             int64_t *failed_at);
+                             const real *q, const real *u, const real *memory, const real *efforts,
+                             real *qdot, real *udot, mstmm_failure *failure, int64_t *failed_at);
 
 typedef struct {
     int action; /* MSTMM_FIRE_STOP, or MSTMM_FIRE_RESTART with `release` */
@@ -101,13 +100,13 @@ typedef struct {
     const mstmm_probe *probes;
     real *probe_values; /* n_probes x 6, MSTMM_PROBE_NUMBERS of scratch, and nq + nu of a state */
     /* Of the tape's inputs: components of the state that it reads, bounds of all its slots */
-    int n_read;         /* 0: no bounds between two evaluations */
+    int n_read; /* 0: no bounds between two evaluations */
     const int *read;
     mstmm_bounds *bounds;
     real *later; /* nq + nu: scratch; NULL where it reads no velocities of probes */
-    int closes;         /* events read states inside a step, whose loops are closed first */
+    int closes; /* events read states inside a step, whose loops are closed first */
     int n_controllers;
-    const struct mstmm_controller *controllers; /* see control.h */
+    const struct mstmm_controller *controllers; /* see controllers.h */
     /* Code compiled for this scene, or NULL: see mstmm_scene_compiled */
     const mstmm_fused *fused, *fused_lanes;
     real *fused_p;
@@ -117,14 +116,14 @@ typedef struct {
      * NULL: not prepared */
     mstmm_tangent *base, *stage;
     mstmm_implicit implicit;
-    real strain;      /* of the loops at the last projection of speeds: see mstmm_strain */
+    real strain; /* of the loops at the last projection of speeds: see mstmm_strain */
     double attainable; /* see mstmm_system: near a singular pose */
-    int rechosen;     /* rows were chosen again when they were last closed */
-    real *speeds;     /* nu: those of a stage near a singular pose; NULL: there are no loops */
+    int rechosen; /* rows were chosen again when they were last closed */
+    real *speeds; /* nu: those of a stage near a singular pose; NULL: there are no loops */
     int on_positions; /* the present step closes gaps but no velocity errors: index 3 */
-    int steady;       /* nothing in the scene depends on time */
+    int steady; /* nothing in the scene depends on time */
     int *coordinates; /* nu: see mstmm_implicit */
-    real *known;      /* nq + 3 nu: scratch */
+    real *known; /* nq + 3 nu: scratch */
     mstmm_implicit_code implicit_code;
 } mstmm_scene_run;
 

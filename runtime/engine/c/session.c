@@ -7,7 +7,7 @@
 static const real SAME = 1e-9; /* of a step: a time so near to a grid point is that point */
 
 /* The tick ends where a single run with the same steps would end a step. */
-static real end_of(const mstmm_run *run, real dt)
+static real tick_end(const mstmm_run *run, real dt)
 {
     const real end = run->real.t + dt, h = run->fixed_step;
     if (!(h > 0)) return end;
@@ -19,7 +19,7 @@ static real end_of(const mstmm_run *run, real dt)
     return fabs(grid - end) <= SAME * h ? grid : end;
 }
 
-static int refuse(mstmm_session *session, int which)
+static int reject_call(mstmm_session *session, int which)
 {
     session->refused = which;
     return MSTMM_REFUSED;
@@ -37,12 +37,12 @@ int mstmm_session_rest(mstmm_session *session, real wall)
 int mstmm_session_advance(mstmm_session *session, real dt, real wall)
 {
     mstmm_run *run = session->run;
-    const real end = end_of(run, dt);
+    const real end = tick_end(run, dt);
     const size_t bytes = (size_t)session->n * sizeof(real);
-    if (!(dt >= 0) || !isfinite(end)) return refuse(session, -1);
+    if (!(dt >= 0) || !isfinite(end)) return reject_call(session, -1);
     for (int i = 0; i < session->n; i++)
-        if (!isfinite(session->given[i])) return refuse(session, i);
-    if (run->count.status == MSTMM_STOPPED) return refuse(session, -2);
+        if (!isfinite(session->given[i])) return reject_call(session, i);
+    if (run->count.status == MSTMM_STOPPED) return reject_call(session, -2);
     if (end >= session->reach) return MSTMM_UNMAPPED;
     const int changed = bytes && memcmp(session->held, session->given, bytes);
     if (changed) {

@@ -1,12 +1,12 @@
-/* Calls on single states; see alone.h. */
-#include "alone.h"
+/* Calls on single states; see single_state.h. */
+#include "single_state.h"
 
 #include <string.h>
 
 #include "is_finite.h"
 #include "sweep_steps.h"
 
-static int is_state(const mstmm_model *model, real t, const real *const *rows)
+static int is_finite_state(const mstmm_model *model, real t, const real *const *rows)
 {
     return isfinite(t) && mstmm_finite(model->nq, rows[0]) && mstmm_finite(model->nu, rows[1]);
 }
@@ -19,12 +19,12 @@ int mstmm_alone_accelerations(const void *record, real t, const real *const *row
     const real *q = rows[0], *u = rows[1], *efforts = rows[2];
     mstmm_failure failure;
     int failed;
-    if (!is_state(model, t, rows)) return 1;
+    if (!is_finite_state(model, t, rows)) return 1;
     if (alone->fused) {
         mstmm_renew_inputs(&alone->live, t, alone->memory, alone->p);
-        failed = alone->fused->accelerations(alone->p, &t, q, u, alone->memory,
-                                             efforts ? efforts : alone->none, alone->qdot,
-                                             answers[0]);
+        failed =
+            alone->fused->accelerations(alone->p, &t, q, u, alone->memory,
+                                        efforts ? efforts : alone->none, alone->qdot, answers[0]);
     } else {
         failed = mstmm_accelerations(model, alone->workspace, t, q, u, alone->memory, efforts,
                                      alone->qdot, answers[0], NULL, &failure);
@@ -39,7 +39,7 @@ int mstmm_alone_efforts(const void *record, real t, const real *const *rows, rea
     const real *q = rows[0], *u = rows[1], *udot = rows[2];
     mstmm_failure failure;
     int failed;
-    if (!is_state(model, t, rows) || !mstmm_finite(model->nu, udot)) return 1;
+    if (!is_finite_state(model, t, rows) || !mstmm_finite(model->nu, udot)) return 1;
     if (alone->inverse) {
         mstmm_renew_inputs(&alone->live, t, alone->memory, alone->p);
         failed = alone->inverse->required(alone->p, &t, q, u, alone->memory, udot, answers[0]);
@@ -69,11 +69,11 @@ int mstmm_alone_mass(const void *record, real none, const real *const *rows, rea
 }
 
 /* Fills the sums over the scene. */
-static int summed(const mstmm_alone *alone, real t, const real *const *rows, real *sums)
+static int sum_scene(const mstmm_alone *alone, real t, const real *const *rows, real *sums)
 {
     const mstmm_observation wanted = {.sums = sums};
     mstmm_failure failure;
-    if (!is_state(alone->model, t, rows)) return 1;
+    if (!is_finite_state(alone->model, t, rows)) return 1;
     const int failed = mstmm_observe(alone->model, alone->workspace, t, rows[0], rows[1],
                                      alone->memory, &wanted, &failure);
     return failed || !mstmm_finite(MSTMM_SUM_NUMBERS, sums);
@@ -82,29 +82,28 @@ static int summed(const mstmm_alone *alone, real t, const real *const *rows, rea
 int mstmm_alone_energy(const void *record, real t, const real *const *rows, real *const *answers)
 {
     real sums[MSTMM_SUM_NUMBERS];
-    const int failed = summed(record, t, rows, sums);
+    const int failed = sum_scene(record, t, rows, sums);
     *answers[0] = failed ? 0 : sums[0] + sums[1] + sums[2];
     return failed;
 }
 
-int mstmm_alone_momentum(const void *record, real t, const real *const *rows,
-                         real *const *answers)
+int mstmm_alone_momentum(const void *record, real t, const real *const *rows, real *const *answers)
 {
     real sums[MSTMM_SUM_NUMBERS];
-    const int failed = summed(record, t, rows, sums);
+    const int failed = sum_scene(record, t, rows, sums);
     if (!failed) memcpy(answers[0], sums + 4, 6 * sizeof(real));
     return failed;
 }
 
-static real length_of(const real *four)
+static real quaternion_length(const real *four)
 {
     return sqrt(four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]);
 }
 
 /* Unit quaternion after dt at its rate, which is perpendicular to it. */
-static void turn(real dt, const real *rate, real *four)
+static void turn_quaternion(real dt, const real *rate, real *four)
 {
-    const real speed = length_of(rate);
+    const real speed = quaternion_length(rate);
     for (int k = 0; speed > 0 && k < 4; k++)
         four[k] = cos(speed * dt) * four[k] + sin(speed * dt) / speed * rate[k];
 }
@@ -115,20 +114,25 @@ int mstmm_alone_moved(const void *record, real dt, const real *const *rows, real
     const mstmm_model *model = alone->inertia;
     real *q = answers[0], *rate = alone->qdot;
     mstmm_failure failure;
-    if (!is_state(model, dt, rows)) return 1;
+    if (!is_finite_state(model, dt, rows)) return 1;
     memcpy(q, rows[0], (size_t)model->nq * sizeof(real));
     for (int k = 0; k < alone->n_quaternions; k++) {
         real *four = q + alone->quaternions[k];
-        const real size = length_of(four);
+        const real size = quaternion_length(four);
         for (int i = 0; i < 4; i++) four[i] /= size;
     }
-    mstmm_state state = {.model = model, .workspace = alone->workspace, .memory = alone->memory,
-                         .q = q, .u = rows[1], .qdot = rate, .failure = &failure};
+    mstmm_state state = {.model = model,
+                         .workspace = alone->workspace,
+                         .memory = alone->memory,
+                         .q = q,
+                         .u = rows[1],
+                         .qdot = rate,
+                         .failure = &failure};
     for (int i = 0; i < model->n_bodies; i++)
         if (mstmm_at_hinge_motion(&state, i)) return 1;
     for (int k = 0; k < alone->n_quaternions; k++) {
         const int first = alone->quaternions[k];
-        turn(dt, rate + first, q + first);
+        turn_quaternion(dt, rate + first, q + first);
         memset(rate + first, 0, 4 * sizeof(real));
     }
     for (int i = 0; i < model->nq; i++) q[i] += rate[i] * dt;

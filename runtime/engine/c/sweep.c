@@ -1,11 +1,7 @@
-/* Calls of the passes: initialisation, evaluation of expressions, entries for Python; see
- * sweep.h.  The passes themselves are printed from the schedule (sweep_steps.c). */
-#include <math.h>
-#include <stdint.h>
+/* What passes call: the record of a failure, and the expressions of a scene, at a state and along a
+ * direction; see sweep.h.  The passes themselves are printed from the schedule (sweep_steps.c). */
 #include <string.h>
 
-#include "hinge_call.h"
-#include "loops.h"
 #include "sweep.h"
 #include "sweep_steps.h"
 
@@ -17,32 +13,6 @@ int mstmm_fail(mstmm_state *state, int reason, int element, int code)
         state->failure->code = code;
     }
     return reason;
-}
-
-int mstmm_hinge_interpreted(mstmm_state *state, const mstmm_body *body,
-                            struct mstmm_hinge_hinge to)
-{
-    const real *inputs[MSTMM_HINGE_HINGE_INPUTS];
-    real *outputs[MSTMM_HINGE_HINGE_OUTPUTS];
-    mstmm_hinge_hinge_arrays(to, inputs, outputs);
-    return mstmm_tape_run(body->kernels->tape, inputs, mstmm_slots(state), outputs);
-}
-
-int mstmm_hinge_slope_interpreted(mstmm_state *state, const mstmm_body *body,
-                                  struct mstmm_hinge_hinge_slope to)
-{
-    const real *inputs[MSTMM_HINGE_HINGE_SLOPE_INPUTS];
-    real *outputs[MSTMM_HINGE_HINGE_SLOPE_OUTPUTS];
-    mstmm_hinge_hinge_slope_arrays(to, inputs, outputs);
-    return mstmm_tape_run(body->kernels->slope_tape, inputs, mstmm_slots(state), outputs);
-}
-
-int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,
-                       real *value)
-{
-    const real *inputs[] = {&state->t, state->q, state->u, length, mstmm_input_numbers(state)};
-    real *outputs[] = {value};
-    return mstmm_tape_run(effort, inputs, mstmm_slots(state), outputs);
 }
 
 int mstmm_hook_drive_values(mstmm_state *state)
@@ -68,68 +38,46 @@ int mstmm_hook_expression_values(mstmm_state *state)
     return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;
 }
 
-int mstmm_accelerations(const mstmm_model *model, real *workspace, real t, const real *q,
-                        const real *u, const real *memory, const real *efforts, real *qdot,
-                        real *udot, mstmm_balance *balance, mstmm_failure *failure)
+int mstmm_given_effort(mstmm_state *state, const mstmm_tape *effort, const real *length,
+                       real *value)
 {
-    /* Every field by name, so that no memset is needed: this is called a million times. */
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .given = NULL, .efforts = efforts, .column = NULL,
-                         .qdot = qdot, .udot = udot, .required = NULL, .answer = NULL,
-                         .balance = balance, .failure = failure,
-                         .linked = !(model->needs_pose || model->product || model->qr),
-                         .observed = 0,
-                         .hinges_known = 0, .level = 0, .give = 0, .closing = 0, .refined = 0, .asked = NULL, .strike = NULL};
-    if (balance) balance->power = balance->potential = 0;
-    if (model->flat && !balance && !(model->refines || model->product || model->qr)) {
-        mstmm_flat_ground(&state);
-        return mstmm_run_accelerations_in_plane(&state);
-    }
-    mstmm_ground(&state);
-    const int code = mstmm_run_accelerations(&state);
-    return code || !model->refines ? code : mstmm_refine(&state, q, u);
+    const real *inputs[] = {&state->t, state->q, state->u, length, mstmm_input_numbers(state)};
+    real *outputs[] = {value};
+    return mstmm_tape_run(effort, inputs, mstmm_slots(state), outputs);
 }
 
-int mstmm_accelerations_kept(const mstmm_model *model, real *workspace, real t, const real *q,
-                             const real *u, const real *memory, real *qdot, real *udot,
-                             mstmm_balance *balance, mstmm_failure *failure)
+int mstmm_hook_drive_slopes(mstmm_state *state)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .qdot = qdot, .udot = udot, .balance = balance,
-                         .observed = 1,
-                         .failure = failure};
-    if (balance) balance->power = balance->potential = 0;
-    mstmm_ground(&state);
-    const int code = mstmm_run_accelerations(&state);
-    return code || !model->refines ? code : mstmm_refine(&state, q, u);
+    mstmm_state *slope = state->slope;
+    const mstmm_model *model = state->model;
+    const real *inputs[] = {&state->t, mstmm_input_numbers(state), &slope->t};
+    real *outputs[] = {mstmm_drive_values(slope)};
+    memcpy(mstmm_filled_q(slope), slope->q, (size_t)model->nq * sizeof(real));
+    memcpy(mstmm_filled_u(slope), slope->u, (size_t)model->nu * sizeof(real));
+    const int code = mstmm_tape_run(model->drive_slopes, inputs, mstmm_slots(slope), outputs);
+    if (code) return mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code);
+    slope->q = mstmm_filled_q(slope);
+    slope->u = mstmm_filled_u(slope);
+    return 0;
 }
 
-int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, const real *q,
-                           const real *u, const real *memory, const real *udot, real *efforts,
-                           mstmm_failure *failure)
+int mstmm_hook_expression_slopes(mstmm_state *state)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .t = t, .q = q, .u = u,
-                         .memory = memory, .given = udot, .required = efforts, .failure = failure};
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    return mstmm_run_inverse_dynamics(&state);
+    mstmm_state *slope = state->slope;
+    const real *inputs[] = {&state->t, state->q, state->u, mstmm_input_numbers(state),
+                            &slope->t, slope->q, slope->u};
+    real *outputs[] = {mstmm_values(slope)};
+    const int code =
+        mstmm_tape_run(state->model->value_slopes, inputs, mstmm_slots(slope), outputs);
+    return code ? mstmm_fail(state, MSTMM_FAILED_EXPRESSION, -1, code) : 0;
 }
 
-int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real *q,
-                const real *memory, const real *columns, real *answers, mstmm_failure *failure)
+int mstmm_given_effort_slope(mstmm_state *state, const mstmm_tape *tape, const real *length,
+                             const real *d_length, real *d_value)
 {
-    mstmm_state state = {.model = model, .workspace = workspace, .memory = memory, .q = q,
-                         .failure = failure};
-    real *still = mstmm_filled_u(&state);
-    memset(still, 0, (size_t)model->nu * sizeof(real));
-    state.u = still;
-    state.qdot = mstmm_spare_qdot(&state);
-    mstmm_ground(&state);
-    int code = mstmm_run_factorisation(&state);
-    for (int64_t k = 0; !code && k < n; k++) {
-        state.column = columns + k * model->nu;
-        state.answer = answers + k * model->nu;
-        code = mstmm_run_solution(&state);
-    }
-    return code;
+    mstmm_state *slope = state->slope;
+    const real *inputs[] = {&state->t, state->q, state->u, length,  mstmm_input_numbers(state),
+                            &slope->t, slope->q, slope->u, d_length};
+    real *outputs[] = {d_value};
+    return mstmm_tape_run(tape, inputs, mstmm_slots(slope), outputs);
 }

@@ -250,7 +250,7 @@ typedef struct {
 typedef struct {
     int n_bodies, nq, nu, n_memory;
     int n_flexible; /* bodies with modes */
-    int n_imposed;  /* bodies with driven or held speeds */
+    int n_imposed; /* bodies with driven or held speeds */
     const mstmm_product *product; /* accelerations by the plain product; NULL: by a sweep */
     int qr; /* the sweep is that of least squares */
     mstmm_body *bodies;
@@ -280,24 +280,24 @@ typedef struct {
     real flat_gravity[2]; /* in the plane's axes, which replace inertial ones */
     int n_rows, first_ground_row; /* rows from the latter on close at the ground */
     const mstmm_loop_row *rows;
-    int64_t loops;        /* first number of closed loops in the workspace */
+    int64_t loops; /* first number of closed loops in the workspace */
     int64_t loops_summed; /* number of sums among them */
-    int64_t answer;       /* and of nu numbers: a solution that is refined */
-    int refines;          /* number of refinements of accelerations, for heavy outboard bodies */
+    int64_t answer; /* and of nu numbers: a solution that is refined */
+    int refines; /* number of refinements of accelerations, for heavy outboard bodies */
     int n_choices; /* closures whose rows are chosen during the run */
     int n_couplings;
     const mstmm_coupling *couplings;
     const mstmm_tape *coupling_tape; /* t, q, u -> their numbers */
     const mstmm_tape *coupling_slopes; /* the same and derivatives of all -> those of the numbers */
     int64_t coupling_numbers; /* the first behind `loops` */
-    real loops_apart;     /* gap (m, rad) above which a row is no longer redundant */
-    real loops_strain;    /* strain from which on a pose is near a singular one; 0: never */
-    int loops_singular;   /* a run starts in a singular pose */
-    int strained;         /* index in memory that is 1 while the last step ended there; -1: none */
+    real loops_apart; /* gap (m, rad) above which a row is no longer redundant */
+    real loops_strain; /* strain from which on a pose is near a singular one; 0: never */
+    int loops_singular; /* a run starts in a singular pose */
+    int strained; /* index in memory that is 1 while the last step ended there; -1: none */
     int needs_pose; /* loads or forces that need poses and velocities */
     int64_t workspace; /* numbers of workspace */
-    int64_t scratch;   /* first number behind the blocks: state copy, values, tape slots */
-    int tape_slots;    /* largest workspace of a tape */
+    int64_t scratch; /* first number behind the blocks: state copy, values, tape slots */
+    int tape_slots; /* largest workspace of a tape */
 } mstmm_model;
 
 /* Reason and element of a failure.  `element` is the index of a body, or of a force for
@@ -308,7 +308,7 @@ typedef struct {
 
 /* Sums over the scene. */
 typedef struct {
-    real power;     /* of dampers, friction, efforts, loads and drives: everything not stored */
+    real power; /* of dampers, friction, efforts, loads and drives: everything not stored */
     real potential; /* of springs and laws */
 } mstmm_balance;
 
@@ -327,8 +327,8 @@ int mstmm_inverse_dynamics(const mstmm_model *model, real *workspace, real t, co
                            mstmm_failure *failure);
 /* The mass matrix (nu x nu) of a tree without flexible bodies, driven coordinates as if free.
  * `work` has 2 nu numbers. */
-int mstmm_mass_matrix(const mstmm_model *model, real *workspace, const real *q,
-                      const real *memory, real *matrix, real *work, mstmm_failure *failure);
+int mstmm_mass_matrix(const mstmm_model *model, real *workspace, const real *q, const real *memory,
+                      real *matrix, real *work, mstmm_failure *failure);
 /* M^-1 times `n` successive columns of efforts (nu each) on the free speeds; else zero. */
 int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real *q,
                 const real *memory, const real *columns, real *answers, mstmm_failure *failure);
@@ -337,8 +337,8 @@ int mstmm_solve(const mstmm_model *model, real *workspace, int64_t n, const real
  * (MSTMM_GAP).  With `give` rows have a compliance of that fraction of their mobility.  `missing`
  * (n_rows, NULL: not needed) receives the errors of the rows. */
 int mstmm_correction(const mstmm_model *model, real *workspace, int level, real give, real t,
-                     const real *q, const real *u, const real *memory, real *change,
-                     real *missing, mstmm_failure *failure);
+                     const real *q, const real *u, const real *memory, real *change, real *missing,
+                     mstmm_failure *failure);
 /* Multipliers (n_rows) of rows with errors `asked` and a compliance of `give` times their
  * mobility, at rest: with a small compliance only those of self-stress states remain.  Their loads
  * stay in the workspace. */
@@ -359,8 +359,8 @@ int mstmm_choose_rows(const mstmm_model *model, real *workspace, real t, const r
 /* Closes gaps and, unless `gaps_alone`, removes velocity errors, in place; sets driven
  * coordinates. */
 int mstmm_close_loops(const mstmm_model *model, real *workspace, real t, real *q, real *u,
-                      const real *memory, int n_quaternions, const int *quaternions,
-                      int gaps_alone, mstmm_failure *failure);
+                      const real *memory, int n_quaternions, const int *quaternions, int gaps_alone,
+                      mstmm_failure *failure);
 /* Numbers that a flexible body of n modes, and one of its sections, have in the workspace. */
 int64_t mstmm_modal_numbers(int n);
 int64_t mstmm_section_numbers(int n);
@@ -382,16 +382,16 @@ static inline int mstmm_imposed(const mstmm_body *body, const real *memory)
 
 /* Data of the tangent of a step. */
 typedef struct mstmm_tangents {
-    real *numbers;        /* see mstmm_tangent_lay */
-    int kept;             /* S of every body stays */
+    real *numbers; /* see mstmm_tangent_lay */
+    int kept; /* S of every body stays */
     /* Along unknowns x: du = rate x, da = s x, dq = (sq - kappa g_q)^-1 N x */
     real rate, s, sq, kappa;
-    int laws_alone;       /* kappa is ignored: see mstmm_laws_factor */
-    int shifted;          /* some increments of a right-hand side are known */
+    int laws_alone; /* kappa is ignored: see mstmm_laws_factor */
+    int shifted; /* some increments of a right-hand side are known */
     int *negative; /* whether the determinant is negative so far; NULL: that is a failure */
-    const real *rho;      /* nq: errors of the rates */
-    real *change;         /* nq: change of the coordinates */
-    const int64_t *unit;  /* loads that are 1 in a right-hand side; NULL: none */
+    const real *rho; /* nq: errors of the rates */
+    real *change; /* nq: change of the coordinates */
+    const int64_t *unit; /* loads that are 1 in a right-hand side; NULL: none */
     int n_unit;
 } mstmm_tangents;
 
@@ -400,24 +400,24 @@ typedef struct mstmm_state {
     const mstmm_model *model;
     real *workspace;
     real t;
-    const real *q, *u, *memory;   /* q and u with driven coordinates filled in */
-    const real *given;            /* prescribed accelerations (inverse dynamics), or NULL */
+    const real *q, *u, *memory; /* q and u with driven coordinates filled in */
+    const real *given; /* prescribed accelerations (inverse dynamics), or NULL */
     const real *efforts, *column; /* owned by the caller; NULL: none */
     real *qdot, *udot, *required, *answer;
     mstmm_balance *balance; /* NULL: not requested */
     mstmm_failure *failure;
-    int linked;       /* runs with numbers are swept as links */
-    int observed;     /* ends without loads are swept too */
+    int linked; /* runs with numbers are swept as links */
+    int observed; /* ends without loads are swept too */
     int hinges_known; /* the motion of hinges is known */
-    int level;        /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
-    real give;        /* see mstmm_correction */
-    const struct mstmm_strike *strike; /* see bounce.h; NULL: none */
+    int level; /* MSTMM_GAP, MSTMM_SLIP; 0: accelerations */
+    real give; /* see mstmm_correction */
+    const struct mstmm_strike *strike; /* see impact.h; NULL: none */
     const real *asked; /* errors of the rows that replace gap or slip; NULL: none */
-    int refined;      /* `given` is a solution with its multipliers: solve for its residual */
-    real closing;     /* above 0: accelerations close gaps by this factor */
-    int residual;     /* drives prescribe accelerations although others are given */
-    real *chosen;     /* memory for a new choice of rows; NULL: the choice is kept */
-    int changed;      /* the choice is new */
+    int refined; /* `given` is a solution with its multipliers: solve for its residual */
+    real closing; /* above 0: accelerations close gaps by this factor */
+    int residual; /* drives prescribe accelerations although others are given */
+    real *chosen; /* memory for a new choice of rows; NULL: the choice is kept */
+    int changed; /* the choice is new */
     struct mstmm_state *slope; /* derivatives along a direction; NULL: none */
     mstmm_tangents *tangents;
 } mstmm_state;
@@ -457,8 +457,7 @@ static inline real *mstmm_spare_udot(const mstmm_state *state)
 static inline const real *mstmm_input_numbers(const mstmm_state *state)
 {
     real *numbers = mstmm_spare_udot(state) + state->model->nu;
-    mstmm_inputs_at(state->model->n_inputs, state->model->inputs, state->t, state->memory,
-                    numbers);
+    mstmm_inputs_at(state->model->n_inputs, state->model->inputs, state->t, state->memory, numbers);
     return numbers;
 }
 
@@ -488,8 +487,7 @@ static inline void mstmm_flat_ground(const mstmm_state *state)
     real *ground = mstmm_flat_block(state, -1);
     memset(ground, 0, MSTMM_FLAT * sizeof(real));
     ground[MSTMM_FLAT_A] = 1;
-    for (int i = 0; i < 2; i++)
-        ground[MSTMM_FLAT_MOTION + 2 + i] = -state->model->flat_gravity[i];
+    for (int i = 0; i < 2; i++) ground[MSTMM_FLAT_MOTION + 2 + i] = -state->model->flat_gravity[i];
 }
 
 int mstmm_fail(mstmm_state *state, int reason, int element, int code);
@@ -503,8 +501,8 @@ static inline int mstmm_idle(int observed, const mstmm_body *body)
 /* True if the sweep from tips to root skips this body. */
 static inline int mstmm_aside(const mstmm_model *model, int observed, int index)
 {
-    return (model->looped && model->looped[index].closure)
-           || mstmm_idle(observed, &model->bodies[index]);
+    return (model->looped && model->looped[index].closure) ||
+           mstmm_idle(observed, &model->bodies[index]);
 }
 
 /* Modes of the flexible body of a body or section; NULL: none. */

@@ -10,7 +10,7 @@
  * multiplier of a row; or that of a coupling. */
 typedef struct {
     int frame, direction; /* the hinge's frame (-1: a coupling), and which of its six directions */
-    int speed, row;       /* -1: the other is meant */
+    int speed, row; /* -1: the other is meant */
 } mstmm_coupled_row;
 
 /* Couplings that the elimination along the tree does not contain: loads on bodies that change with
@@ -22,14 +22,14 @@ typedef struct {
     int n_bodies, n_efforts, n_rows, n_passes;
     const int *bodies; /* on which such loads act: 6 numbers each */
     const int64_t *efforts; /* where an effort changes, in the derivatives' workspace */
-    const int *speeds;      /* and the speed that it acts on */
+    const int *speeds; /* and the speed that it acts on */
     const mstmm_coupled_row *rows;
     const int *group, *rank; /* of every unknown, its group and its place in the matrix */
     const int *first_reader, *reader, *first_moved, *moved; /* by group: unknowns, and speeds */
     const int *first_seed, *seed; /* by pass: unknowns that are solved together */
-    const int *first_unit;        /* and the positions of the loads among these, */
-    const int64_t *unit;          /* in the derivatives' workspace */
-    int below, above;             /* lower and upper bandwidth of the matrix */
+    const int *first_unit; /* and the positions of the loads among these, */
+    const int64_t *unit; /* in the derivatives' workspace */
+    int below, above; /* lower and upper bandwidth of the matrix */
 } mstmm_couplings;
 
 /* A scene at one state with its derivatives: everything is the caller's.  `work` has
@@ -37,17 +37,17 @@ typedef struct {
 typedef struct {
     const mstmm_model *model;
     real *workspace, *memory, *work, *numbers;
-    int64_t slots;        /* largest workspace of a tape of derivatives */
+    int64_t slots; /* largest workspace of a tape of derivatives */
     const mstmm_couplings *couplings;
-    int n_coupled;        /* numbers that they change by */
-    real *answers;        /* passes x nu: to one of each unknown */
-    real *closure;        /* n_coupled x (numbers of a row of the matrix + 4) */
-    int known;            /* there has been a residual since the memory changed */
-    int laws_alone;       /* the last tangent was that of mstmm_laws_factor */
-    int on_positions;     /* rows are those of positions only: see mstmm_across_solve */
-    int rows_of_motion;   /* rows are those of small motions x, J x = 0, for any s */
-    int counts;           /* pivots may be negative: they are counted */
-    int keeps, kept;      /* tangents keep S of every body, as known increments need */
+    int n_coupled; /* numbers that they change by */
+    real *answers; /* passes x nu: to one of each unknown */
+    real *closure; /* n_coupled x (numbers of a row of the matrix + 4) */
+    int known; /* there has been a residual since the memory changed */
+    int laws_alone; /* the last tangent was that of mstmm_laws_factor */
+    int on_positions; /* rows are those of positions only: see mstmm_across_solve */
+    int rows_of_motion; /* rows are those of small motions x, J x = 0, for any s */
+    int counts; /* pivots may be negative: they are counted */
+    int keeps, kept; /* tangents keep S of every body, as known increments need */
     real t, rate, s, sq, kappa; /* of the last residual and tangent */
     mstmm_failure failure;
 } mstmm_tangent;

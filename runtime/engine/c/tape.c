@@ -3,7 +3,8 @@
 
 #include <math.h>
 
-#define CASE(code, value) case code: result = value; break;
+#define CASE(code, value)                                                                          \
+    case code: result = value; break;
 
 /* Runs the tape in `workspace` (n_slots numbers), then writes the outputs.  Returns 0, the code of
  * the guard that failed (nothing is written then) or MSTMM_TAPE_UNKNOWN. */
@@ -21,7 +22,7 @@ int mstmm_tape_run(const mstmm_tape *tape, const real *const *inputs, real *work
         const real a = w[step[2]], b = w[step[3]], c = w[step[4]];
         real result;
         switch (step[0]) {
-        MSTMM_TAPE_OPERATIONS(CASE)
+            MSTMM_TAPE_OPERATIONS(CASE)
         case MSTMM_TAPE_GUARD:
             if (!(fabs(a) > 0)) return step[1];
             continue;

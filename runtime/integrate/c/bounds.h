@@ -4,8 +4,8 @@
 
 /* cdef begin */
 typedef struct mstmm_bounds {
-  double lo, hi;             /* -INFINITY, INFINITY: anything */
-  double slope_lo, slope_hi; /* 1/s */
+    double lo, hi;             /* -INFINITY, INFINITY: anything */
+    double slope_lo, slope_hi; /* 1/s */
 } mstmm_bounds;
 /* cdef end */
 

@@ -2,15 +2,13 @@
 #ifndef MSTMM_IMPLICIT_STEP_H
 #define MSTMM_IMPLICIT_STEP_H
 
-#include "work.h"
+#include "workspace.h"
 
 /* ---- for the loop: as the functions of step.h without "implicit" ---- */
 
 /* The slope at the start of a step has just been evaluated: accelerations from it, and nothing else
  * is known. */
 void mstmm_implicit_restart(const mstmm_work *work);
-/* From the slope at the start to y_new and the error. */
-int mstmm_implicit_stages(const mstmm_work *work);
 /* What an accepted step needs besides: the slope at its end, quadratures, dense output if
  * wanted. */
 int mstmm_implicit_finish(const mstmm_work *work, int wants_dense);
@@ -18,7 +16,7 @@ double mstmm_implicit_norm(const mstmm_work *work, double *absolute);
 int64_t mstmm_implicit_worst(const mstmm_work *work);
 double mstmm_implicit_first_step(const mstmm_work *work, double interval);
 
-/* ---- the steppers ---- */
+/* ---- the steppers: from the slope at the start of a step to y_new and the error ---- */
 
 int mstmm_rosenbrock_stages(const mstmm_work *work);
 int mstmm_dirk_stages(const mstmm_work *work);
@@ -41,7 +39,7 @@ int mstmm_step_rates(const mstmm_work *work, double t, const double *q, const do
                      double *dq);
 /* `laws`: that of laws alone */
 int mstmm_step_tangent(const mstmm_work *work, double t, const double *row, double s, double sq,
-                  int kappa, int laws);
+                       int kappa, int laws);
 /* For the right-hand side in work->residual, to work->dq, du and da. */
 int mstmm_step_solve(const mstmm_work *work, double t, const double *rho_q, const double *rho_u);
 /* A slope row at a state row: rates, accelerations, and rates of the quadratures. */
@@ -53,14 +51,14 @@ int mstmm_check_new(const mstmm_work *work);
 
 /* Equations of one stage, whose unknown state is in work->y_stage. */
 typedef struct mstmm_newton_equations {
-  double t, s, sq; /* as `tangent` takes them */
-  int kappa;
-  double h;      /* DIRK: gamma times the step */
-  double cq, cu; /* Alpha: what an acceleration adds to coordinates and speeds */
-  /* How far the coordinates are from their own equation, to work->rho_q; NULL: they obey it. */
-  int (*defect)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
-  /* Takes the increments in work->dq and da into y_stage. */
-  int (*move)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
+    double t, s, sq; /* as `tangent` takes them */
+    int kappa;
+    double h;      /* DIRK: gamma times the step */
+    double cq, cu; /* Alpha: what an acceleration adds to coordinates and speeds */
+    /* How far the coordinates are from their own equation, to work->rho_q; NULL: they obey it. */
+    int (*defect)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
+    /* Takes the increments in work->dq and da into y_stage. */
+    int (*move)(const mstmm_work *work, const struct mstmm_newton_equations *stage);
 } mstmm_newton_equations;
 
 /* Solves a stage from the start value in y_stage. */

@@ -7,23 +7,23 @@
 
 /* The workspace cut into rows of n_state x lanes numbers, rounded up to whole vectors. */
 typedef struct mstmm_cut_group {
-  mstmm_group *group;
-  const mstmm_system *system;
-  const mstmm_tableau *tableau;
-  int lanes;
-  int64_t n, row;
-  double *y, *k, *y_new, *y_stage, *dense; /* k: s + 1 + n_extra rows; dense: n_dense rows */
-  double *atol;                            /* a row: infinite where there is no error to control */
-  double *one;                             /* n_state: a single state */
+    mstmm_group *group;
+    const mstmm_system *system;
+    const mstmm_tableau *tableau;
+    int lanes;
+    int64_t n, row;
+    double *y, *k, *y_new, *y_stage, *dense; /* k: s + 1 + n_extra rows; dense: n_dense rows */
+    double *atol; /* a row: infinite where there is no error to control */
+    double *one; /* n_state: a single state */
 } mstmm_cut_group;
 
 /* Data of the present attempt of all lanes. */
 typedef struct mstmm_attempt {
-  double h[GROUP];                               /* of each place of a row */
-  double start[GROUP], end[GROUP], t[GROUP];     /* of the lanes: of the step, and of a stage */
-  int meets_break;                               /* a lane's step starts or ends at a break */
-  int active[GROUP], failed[GROUP], wants_dense[GROUP];
-  double error[GROUP];
+    double h[GROUP]; /* of each place of a row */
+    double start[GROUP], end[GROUP], t[GROUP]; /* of the lanes: of the step, and of a stage */
+    int meets_break; /* a lane's step starts or ends at a break */
+    int active[GROUP], failed[GROUP], wants_dense[GROUP];
+    double error[GROUP];
 } mstmm_attempt;
 
 /* First component of a lane that is not finite, -1 if all are */

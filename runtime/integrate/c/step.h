@@ -2,21 +2,21 @@
 #ifndef MSTMM_STEP_H
 #define MSTMM_STEP_H
 
-#include "work.h"
+#include "workspace.h"
 
 /* Phase of the loop between two calls */
 enum {
-  PHASE_START,   /* sample the start */
-  PHASE_HERE,    /* fire what has become true at the current state */
-  PHASE_SAMPLE,  /* sample the current state, finish, or go on */
-  PHASE_STEP,    /* make the trial step until its error is small enough */
-  PHASE_SWITCH,  /* make it again if a switch is in it, to end just before */
-  PHASE_SCAN,    /* look for the next event in it */
-  PHASE_OUTPUT,  /* samples inside the step */
-  PHASE_FIRE,    /* accept up to the event and fire it */
-  PHASE_CROSS,   /* accept up to where a switch crosses */
-  PHASE_ACCEPT,  /* accept the whole step */
-  PHASE_END      /* count.status is final */
+    PHASE_START,   /* sample the start */
+    PHASE_HERE,    /* fire what has become true at the current state */
+    PHASE_SAMPLE,  /* sample the current state, finish, or go on */
+    PHASE_STEP,    /* make the trial step until its error is small enough */
+    PHASE_SWITCH,  /* make it again if a switch is in it, to end just before */
+    PHASE_SCAN,    /* look for the next event in it */
+    PHASE_OUTPUT,  /* samples inside the step */
+    PHASE_FIRE,    /* accept up to the event and fire it */
+    PHASE_CROSS,   /* accept up to where a switch crosses */
+    PHASE_ACCEPT,  /* accept the whole step */
+    PHASE_END      /* count.status is final */
 };
 
 /* What is known of an event or switch, kept as a double among the others.  Doubtful: it has just
@@ -66,20 +66,24 @@ int mstmm_is_asked(mstmm_run *run);
 /* First step: a guess from y and k, and the step from the slope f1 at y + guess k.  Components lie
  * `stride` doubles apart, tolerances side by side. */
 typedef struct mstmm_slopes {
-  int64_t n, stride;
-  const double *y, *k, *atol;
-  double rtol, interval;
+    int64_t n, stride;
+    const double *y, *k, *atol;
+    double rtol, interval;
 } mstmm_slopes;
 double mstmm_guess_step(const mstmm_slopes *at);
 double mstmm_step_from(const mstmm_slopes *at, double guess, const double *f1, int error_order);
 /* RMS of one error vector, or the combination of two, from sums of squares of n components. */
 double mstmm_combined_error(double h, double high, double low, int64_t n, int both);
 
+/* Time of a clock that only goes on. */
+double mstmm_seconds(void);
+
 /* Makes the next step, shorter and shorter until its error is small enough. */
 int mstmm_try_step(const mstmm_work *work);
 
-MSTMM_INLINE int mstmm_n_watched(const mstmm_system *system) {
-  return system->n_events + system->n_switches;
+MSTMM_INLINE int mstmm_n_watched(const mstmm_system *system)
+{
+    return system->n_events + system->n_switches;
 }
 /* The event functions at (t, y), a value that is not a number being a failure; and the margins of
  * switches, negative on the side where the step began. */

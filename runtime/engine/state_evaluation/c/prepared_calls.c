@@ -10,7 +10,7 @@
 
 enum { MOST_ROWS = 4, MOST_ANSWERS = 8, MOST_AXES = 3 };
 
-/* As alone.h has it. */
+/* As single_state.h has it. */
 typedef int called(const void *record, double number, const double *const *rows,
                    double *const *answers);
 
@@ -32,24 +32,25 @@ typedef struct {
 } prepared;
 
 /* The numbers of a row that C can read where it is; NULL for anything else. */
-static const double *row_of(PyObject *given, npy_intp width)
+static const double *array_row(PyObject *given, npy_intp width)
 {
     if (!PyArray_CheckExact(given)) return NULL;
     PyArrayObject *array = (PyArrayObject *)given;
-    const int fits = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 1
-                     && PyArray_DIM(array, 0) == width && PyArray_ISCARRAY_RO(array);
+    const int fits = PyArray_TYPE(array) == NPY_DOUBLE && PyArray_NDIM(array) == 1 &&
+                     PyArray_DIM(array, 0) == width && PyArray_ISCARRAY_RO(array);
     return fits ? PyArray_DATA(array) : NULL;
 }
 
 /* Fills number and rows; 0 if the arguments are no such state. */
-static int taken(const prepared *one, PyObject *const *given, double *number, const double **rows)
+static int read_arguments(const prepared *one, PyObject *const *given, double *number,
+                          const double **rows)
 {
     if (one->numbered) {
         if (!PyFloat_CheckExact(*given)) return 0;
         *number = PyFloat_AsDouble(*given++);
     }
     for (int k = 0; k < one->n_rows; k++) {
-        rows[k] = row_of(given[k], one->widths[k]);
+        rows[k] = array_row(given[k], one->widths[k]);
         const int left_out = k == one->n_rows - 1 && one->optional && Py_IsNone(given[k]);
         if (!rows[k] && !left_out) return 0;
     }
@@ -57,7 +58,7 @@ static int taken(const prepared *one, PyObject *const *given, double *number, co
 }
 
 /* New arrays for the results; 0 without memory. */
-static int made(const prepared *one, PyObject **arrays, double **answers)
+static int make_arrays(const prepared *one, PyObject **arrays, double **answers)
 {
     for (int k = 0; k < one->n_answers; k++) {
         const shape *of = &one->answers[k];
@@ -71,17 +72,15 @@ static int made(const prepared *one, PyObject **arrays, double **answers)
     return 1;
 }
 
-static int ran(const prepared *one, double number, const double **rows, double **answers)
+static int run_function(const prepared *one, double number, const double **rows, double **answers)
 {
     int failed;
     if (!one->released) return one->function(one->record, number, rows, answers);
-    Py_BEGIN_ALLOW_THREADS
-    failed = one->function(one->record, number, rows, answers);
-    Py_END_ALLOW_THREADS
-    return failed;
+    Py_BEGIN_ALLOW_THREADS failed = one->function(one->record, number, rows, answers);
+    Py_END_ALLOW_THREADS return failed;
 }
 
-static PyObject *handed_over(const prepared *one, PyObject **arrays)
+static PyObject *return_arrays(const prepared *one, PyObject **arrays)
 {
     if (one->n_answers == 1) return arrays[0];
     PyObject *all = PyTuple_New(one->n_answers);
@@ -93,7 +92,7 @@ static PyObject *handed_over(const prepared *one, PyObject **arrays)
     return all;
 }
 
-static PyObject *call(PyObject *self, PyObject *const *given, Py_ssize_t count)
+static PyObject *call_prepared(PyObject *self, PyObject *const *given, Py_ssize_t count)
 {
     const prepared *one = PyCapsule_GetPointer(self, NULL);
     const double *rows[MOST_ROWS];
@@ -101,16 +100,15 @@ static PyObject *call(PyObject *self, PyObject *const *given, Py_ssize_t count)
     PyObject *arrays[MOST_ANSWERS];
     if (!one) return NULL;
     if (count != one->numbered + one->n_rows)
-        return PyErr_Format(PyExc_TypeError, "expected %d arguments",
-                            one->numbered + one->n_rows);
-    if (!taken(one, given, &number, rows)) Py_RETURN_NONE;
-    if (!made(one, arrays, answers)) return NULL;
-    if (!ran(one, number, rows, answers)) return handed_over(one, arrays);
+        return PyErr_Format(PyExc_TypeError, "expected %d arguments", one->numbered + one->n_rows);
+    if (!read_arguments(one, given, &number, rows)) Py_RETURN_NONE;
+    if (!make_arrays(one, arrays, answers)) return NULL;
+    if (!run_function(one, number, rows, answers)) return return_arrays(one, arrays);
     for (int k = 0; k < one->n_answers; k++) Py_DecRef(arrays[k]);
     Py_RETURN_NONE;
 }
 
-static void forget(PyObject *capsule)
+static void free_prepared(PyObject *capsule)
 {
     prepared *one = PyCapsule_GetPointer(capsule, NULL);
     Py_DecRef(one->kept);
@@ -127,7 +125,7 @@ static int sizes_of(PyObject *given, int most, npy_intp *sizes)
     return PyErr_Occurred() ? -1 : (int)count;
 }
 
-static int filled(prepared *one, PyObject *widths, PyObject *shapes)
+static int fill_prepared(prepared *one, PyObject *widths, PyObject *shapes)
 {
     const Py_ssize_t count = PyTuple_Size(shapes);
     one->n_rows = sizes_of(widths, MOST_ROWS, one->widths);
@@ -146,7 +144,7 @@ static int filled(prepared *one, PyObject *widths, PyObject *shapes)
 }
 
 static PyMethodDef called_as = {
-    "prepared", (PyCFunction)(void (*)(void))call, METH_FASTCALL,
+    "prepared", (PyCFunction)(void (*)(void))call_prepared, METH_FASTCALL,
     "New arrays, or None where what is given are no rows of doubles, or something fails."};
 
 static PyObject *prepare(PyObject *module, PyObject *given)
@@ -163,7 +161,8 @@ static PyObject *prepare(PyObject *module, PyObject *given)
     one->function = (called *)function;
     one->record = (const void *)record;
     one->numbered = numbered, one->optional = optional, one->released = released;
-    PyObject *self = filled(one, widths, shapes) ? PyCapsule_New(one, NULL, forget) : NULL;
+    PyObject *self =
+        fill_prepared(one, widths, shapes) ? PyCapsule_New(one, NULL, free_prepared) : NULL;
     if (!self) {
         PyMem_Free(one);
         return NULL;
@@ -179,8 +178,8 @@ static PyMethodDef methods[] = {
      "prepare(function, record, widths, shapes, numbered, optional, released, kept): a call."},
     {NULL, NULL, 0, NULL}};
 
-static struct PyModuleDef module_def = {PyModuleDef_HEAD_INIT, "_prepared", NULL, -1, methods,
-                                        NULL, NULL, NULL, NULL};
+static struct PyModuleDef module_def = {
+    PyModuleDef_HEAD_INIT, "_prepared", NULL, -1, methods, NULL, NULL, NULL, NULL};
 
 PyMODINIT_FUNC PyInit__prepared(void)
 {

@@ -1,31 +1,26 @@
-/* Observation of states, and the integrator's call-backs. */
+/* Observation of states: motion of points, loads, efforts, energies. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
-#include "between.h"
-#include "bounce.h"
-#include "control.h"
 #include "kernel_calls.h"
-#include "loops.h"
+#include "loop_closure.h"
 #include "scene.h"
 #include "sweep_steps.h"
 
-/* From so many times the strain that is near a singular pose on, what rounding makes of the rows is
- * worth this relative error of a step, and so much for each part of the strain. */
-#define SINGULAR 10
-#define ATTAINABLE 1e-10
-#define OF_STRAIN 2e-6
-
-static mstmm_state state_of(const mstmm_model *model, real *workspace, real t, const real *memory,
-                            mstmm_failure *failure)
+static mstmm_state observed_state(const mstmm_model *model, real *workspace, real t,
+                                  const real *memory, mstmm_failure *failure)
 {
-    return (mstmm_state){.model = model, .workspace = workspace, .t = t, .memory = memory,
-                         .observed = 1, .failure = failure};
+    return (mstmm_state){.model = model,
+                         .workspace = workspace,
+                         .t = t,
+                         .memory = memory,
+                         .observed = 1,
+                         .failure = failure};
 }
 
 /* State as `mstmm_accelerations_kept` left it: coordinates filled, hinges known, poses computed. */
-static int complete(mstmm_state *state, const real *q, const real *u)
+static int complete_state(mstmm_state *state, const real *q, const real *u)
 {
     const mstmm_model *model = state->model;
     state->q = model->n_drives ? mstmm_filled_q(state) : q;
@@ -75,8 +70,8 @@ static void observe_hinges(const mstmm_state *state, const real *udot,
                               .delta = block + MSTMM_BLOCK_DELTA, .A = block + MSTMM_BLOCK_A,
                               .f = load, .force = force, .moment = moment);
         if (wanted->loads) {
-            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12, .f = load,
-                                   .moment = moment);
+            mstmm_frames_moment_at(.A = block + MSTMM_BLOCK_A, .offset = body->connection + 12,
+                                   .f = load, .moment = moment);
             memcpy(wanted->loads + 6 * (size_t)i, force, sizeof force);
             memcpy(wanted->loads + 6 * (size_t)i + 3, moment, sizeof moment);
         }
@@ -137,12 +132,12 @@ static void observe_sums(mstmm_state *state, const mstmm_balance *balance, real 
 int mstmm_observe(const mstmm_model *model, real *workspace, real t, const real *q, const real *u,
                   const real *memory, const mstmm_observation *wanted, mstmm_failure *failure)
 {
-    mstmm_state state = state_of(model, workspace, t, memory, failure);
+    mstmm_state state = observed_state(model, workspace, t, memory, failure);
     mstmm_balance balance;
     real *qdot = mstmm_spare_qdot(&state), *udot = mstmm_spare_udot(&state);
     int code =
         mstmm_accelerations_kept(model, workspace, t, q, u, memory, qdot, udot, &balance, failure);
-    if (!code) code = complete(&state, q, u);
+    if (!code) code = complete_state(&state, q, u);
     if (code) return code;
     if (wanted->udot) memcpy(wanted->udot, udot, (size_t)model->nu * sizeof(real));
     if (wanted->points)
@@ -182,11 +177,11 @@ int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n,
 {
     int code = 0;
     for (int64_t k = 0; k < n && !code; k++) {
-        mstmm_state state = state_of(model, workspace, 0, memory, failure);
+        mstmm_state state = observed_state(model, workspace, 0, memory, failure);
         real inertia[21], momentum[6];
         code = mstmm_inverse_dynamics(model, workspace, 0, q, u + k * model->nu, memory, still,
                                       efforts, failure);
-        if (!code) code = complete(&state, q, u + k * model->nu);
+        if (!code) code = complete_state(&state, q, u + k * model->nu);
         for (int i = 0; i < model->n_bodies && !code; i++)
             energies[k * model->n_bodies + i] = kinetic_energy(&state, i, inertia, momentum);
     }
@@ -194,14 +189,13 @@ int mstmm_kinetic_energies(const mstmm_model *model, real *workspace, int64_t n,
 }
 
 int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t n, const real *t,
-                             const real *q, const real *u, const real *memory,
-                             const real *efforts, real *qdot, real *udot, mstmm_failure *failure,
-                             int64_t *failed_at)
+                             const real *q, const real *u, const real *memory, const real *efforts,
+                             real *qdot, real *udot, mstmm_failure *failure, int64_t *failed_at)
 {
     for (int64_t k = 0; k < n; k++) {
         *failed_at = k;
-        int code = mstmm_accelerations(model, workspace, t[k], q + k * model->nq,
-                                       u + k * model->nu, memory + k * model->n_memory,
+        int code = mstmm_accelerations(model, workspace, t[k], q + k * model->nq, u + k * model->nu,
+                                       memory + k * model->n_memory,
                                        efforts ? efforts + k * model->nu : NULL,
                                        qdot + k * model->nq, udot + k * model->nu, NULL, failure);
         if (code) return code;
@@ -209,91 +203,13 @@ int mstmm_accelerations_many(const mstmm_model *model, real *workspace, int64_t 
     return 0;
 }
 
-/* --- call-backs of the integrator ----------------------------------------------------------- */
-
-static int scene_rhs(void *context, double t, const double *y, double *dy)
-{
-    mstmm_scene_run *run = context;
-    const mstmm_model *model = run->model;
-    mstmm_balance balance;
-    const double *u = y + model->nq;
-    int code = mstmm_stage_state(run, t, &y, &u);
-    if (!code)
-        code = mstmm_accelerations(model, run->workspace, t, y, u, run->memory, NULL, dy,
-                                   dy + model->nq, run->with_power ? &balance : NULL,
-                                   &run->failure);
-    if (run->with_power) dy[model->nq + model->nu] = code ? 0 : balance.power;
-    return code;
-}
-
-/* Twist memory of the quaternion laws: the turn the last accepted step ended in. */
-static void remember_twists(mstmm_scene_run *run, const real *y)
-{
-    const mstmm_model *model = run->model;
-    for (int k = 0; k < model->n_laws; k++) {
-        const mstmm_law *law = &model->laws[k];
-        if (law->twist < 0) continue;
-        const mstmm_body *body = &model->bodies[law->body];
-        real tau[6], potential, power, twist;
-        mstmm_law_quaternion(law->evaluate, .p = law->p, .q = y + body->q + law->coordinate,
-                             .u = mstmm_zeros, .B = law->axes, .effort = mstmm_zeros,
-                             .twist_ref = run->memory + law->twist, .tau = tau, .V = &potential,
-                             .P = &power, .twist = &twist);
-        run->memory[law->twist] = twist;
-    }
-}
-
-/* Unit quaternions, driven values, and closed loops. */
-static int put_in_order(mstmm_scene_run *run, real t, real *y)
-{
-    const mstmm_model *model = run->model;
-    mstmm_unit_quaternions(run->n_quaternions, run->quaternions, y);
-    const int code = mstmm_fill_driven(model, run->workspace, t, y, y + model->nq, run->memory,
-                                       &run->failure);
-    return code || !model->looped ? code : mstmm_scene_close_loops(run, t, y);
-}
-
-int mstmm_scene_settle(mstmm_scene_run *run, real t, real *y)
-{
-    const int code = put_in_order(run, t, y);
-    if (code) return code;
-    remember_twists(run, y);
-    if (run->base) run->base->known = 0;
-    return 0;
-}
-
-int mstmm_scene_settle_many(mstmm_scene_run *run, int64_t n, int64_t width, const real *t,
-                            real *memory, real *y)
-{
-    const int m = run->model->n_memory;
-    real *own = run->memory;
-    int first = 0;
-    for (int64_t k = 0; k < n; k++) {
-        run->memory = m ? memory + k * m : own; /* the projection writes the final turn */
-        const int code = mstmm_scene_settle(run, t[k], y + k * width);
-        if (code && !first) first = code;
-    }
-    run->memory = own;
-    return first;
-}
-
-static int scene_accept(void *context, double t, double *y)
-{
-    mstmm_scene_run *run = context;
-    const int code = mstmm_scene_settle(run, t, y), place = run->model->strained;
-    const real usual = run->model->loops_strain;
-    if (place >= 0) run->memory[place] = run->strain > usual;
-    const real noise = fmax(ATTAINABLE, OF_STRAIN * run->strain);
-    run->attainable = usual > 0 && run->strain > SINGULAR * usual ? noise : 0;
-    const int forgets = run->rechosen ? -1 : 0;
-    const int acted = code ? code : mstmm_controllers_act(run, t, y);
-    return acted ? acted : forgets;
-}
+/* --- states of a run --- */
 
 /* Poses and velocities of all bodies of a state with speeds u, to be read from `state`. */
-static int moved(mstmm_scene_run *run, real t, const real *y, const real *u, mstmm_state *state)
+static int motion_state(mstmm_scene_run *run, real t, const real *y, const real *u,
+                        mstmm_state *state)
 {
-    *state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
+    *state = observed_state(run->model, run->workspace, t, run->memory, &run->failure);
     state->q = y;
     state->u = u;
     state->qdot = mstmm_spare_qdot(state);
@@ -306,7 +222,7 @@ int mstmm_probes_seen(mstmm_scene_run *run, real t, const real *y, const real *u
     if (!run->n_probes) return 0;
     real *one = run->probe_values + 6 * run->n_probes;
     mstmm_state state;
-    const int code = moved(run, t, y, u, &state);
+    const int code = motion_state(run, t, y, u, &state);
     if (code) return code;
     for (int k = 0; k < run->n_probes; k++) {
         observe_probe(&state, &run->probes[k], one);
@@ -319,79 +235,9 @@ int mstmm_kinetic_seen(mstmm_scene_run *run, real t, const real *y, const real *
 {
     mstmm_state state;
     real inertia[21], momentum[6];
-    const int code = moved(run, t, y, u, &state);
+    const int code = motion_state(run, t, y, u, &state);
     *energy = 0;
     for (int i = 0; i < run->model->n_bodies && !code; i++)
         *energy += kinetic_energy(&state, i, inertia, momentum);
     return code;
-}
-
-/* A state inside a step, to be projected, after the numbers of the probes. */
-static int seen_inside(mstmm_scene_run *run, real t, const real **y)
-{
-    real *own = run->probe_values + 6 * run->n_probes + MSTMM_PROBE_NUMBERS;
-    if (!run->closes) return 0;
-    memcpy(own, *y, (size_t)(run->model->nq + run->model->nu) * sizeof(real));
-    *y = own;
-    return put_in_order(run, t, own);
-}
-
-static int scene_events(void *context, double t, const double *y, double *g)
-{
-    mstmm_scene_run *run = context;
-    int code = seen_inside(run, t, &y);
-    const real *u = y + run->model->nq;
-    mstmm_state state = state_of(run->model, run->workspace, t, run->memory, &run->failure);
-    if (!code) code = mstmm_probes_seen(run, t, y, u);
-    if (code) return code;
-    const real *inputs[] = {&t, y, u, run->probe_values, mstmm_input_numbers(&state)};
-    real *outputs[] = {g};
-    return mstmm_tape_run(run->event_tape, inputs, mstmm_slots(&state), outputs)
-               ? MSTMM_FAILED_EXPRESSION
-               : 0;
-}
-
-static int scene_fire(void *context, int event, double t, double *y)
-{
-    mstmm_scene_run *run = context;
-    const mstmm_event_action *action = &run->events[event];
-    if (run->base) run->base->known = 0;
-    if (action->slopes) return mstmm_bounce(run, event, t, y);
-    if (action->action == MSTMM_FIRE_RESTART) run->memory[action->release] = 1;
-    return action->action;
-}
-
-static int scene_lets_through(void *context, int event, double t, const double *y, double g)
-{
-    return seen_inside(context, t, &y) ? 0 : mstmm_lets_through(context, event, t, y, g);
-}
-
-/* True if there is anything to do after a step. */
-static int needs_settling(const mstmm_scene_run *run)
-{
-    const mstmm_model *model = run->model;
-    for (int k = 0; k < model->n_laws; k++)
-        if (model->laws[k].twist >= 0) return 1;
-    return run->n_quaternions > 0 || model->n_drives > 0 || run->n_controllers > 0 ||
-           model->looped;
-}
-
-void mstmm_looped_system(mstmm_scene_run *run, mstmm_system *system)
-{
-    const mstmm_model *model = run->model;
-    memset(system, 0, sizeof *system);
-    system->context = run;
-    system->n_state = model->nq + model->nu + (run->with_power ? 1 : 0);
-    system->n_error = system->n_state; /* the work too: its power has additional kinks */
-    system->rhs = scene_rhs;
-    system->accept = needs_settling(run) ? scene_accept : NULL;
-    system->attainable = run->model->looped ? &run->attainable : NULL;
-    system->n_events = run->n_events;
-    system->n_switches = run->n_switches;
-    system->events = scene_events;
-    system->fire = scene_fire;
-    system->lets_through = scene_lets_through;
-    mstmm_enclose_events(run, system);
-    system->n_memory = model->n_memory;
-    system->memory = run->memory;
 }

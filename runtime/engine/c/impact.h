@@ -1,6 +1,6 @@
 /* Bounces, for the other engine files. */
-#ifndef MSTMM_BOUNCE_H
-#define MSTMM_BOUNCE_H
+#ifndef MSTMM_IMPACT_H
+#define MSTMM_IMPACT_H
 
 #include "scene.h"
 

@@ -1,6 +1,6 @@
 /* Measured quantities of a state, by expressions, and controllers that sample them. */
-#ifndef MSTMM_CONTROL_H
-#define MSTMM_CONTROL_H
+#ifndef MSTMM_CONTROLLERS_H
+#define MSTMM_CONTROLLERS_H
 
 #include "scene.h"
 

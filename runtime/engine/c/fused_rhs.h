@@ -1,6 +1,6 @@
 /* A scene whose accelerations come from code compiled for it. */
-#ifndef MSTMM_COMPILED_H
-#define MSTMM_COMPILED_H
+#ifndef MSTMM_FUSED_RHS_H
+#define MSTMM_FUSED_RHS_H
 
 #include "lanes.h"
 #include "scene.h"
@@ -20,8 +20,7 @@ void mstmm_scene_compiled(mstmm_scene_run *run, const mstmm_fused *one, const ms
 int64_t mstmm_implicit_code_size(const mstmm_fused *fused);
 /* From now on implicit methods use `fused`; p holds the numbers that it reads, as above.  Call it
  * after mstmm_scene_implicit.  All arguments must exist as long as the run. */
-void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p,
-                            real *numbers);
+void mstmm_implicit_by_code(mstmm_scene_run *run, const mstmm_fused *fused, real *p, real *numbers);
 
 /* Trajectories of a scene without events and memory in SIMD lanes of one thread. */
 typedef struct {
@@ -37,8 +36,15 @@ typedef struct {
 
 int64_t mstmm_lanes_numbers(const mstmm_fused *fused);
 /* Fills the integrator's view, whose failure codes are the guards' own, and what the group calls. */
-void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system,
-                              mstmm_group *group);
+void mstmm_scene_lanes_system(mstmm_scene_lanes *lanes, mstmm_system *system, mstmm_group *group);
 /* cdef end */
+
+/* Notes the failure that a code of `fused` means; returns its reason. */
+static inline int mstmm_fused_failure(mstmm_scene_run *run, const mstmm_fused *fused, int code)
+{
+    const int *failure = fused->failures + 3 * (code - 1);
+    run->failure = (mstmm_failure){failure[0], failure[1], failure[2]};
+    return failure[0];
+}
 
 #endif

@@ -1,6 +1,6 @@
 /* Closed loops, for the other engine files; see sweep.h. */
-#ifndef MSTMM_LOOPS_H
-#define MSTMM_LOOPS_H
+#ifndef MSTMM_LOOP_CLOSURE_H
+#define MSTMM_LOOP_CLOSURE_H
 
 #include "sweep.h"
 

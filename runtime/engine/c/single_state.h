@@ -1,6 +1,6 @@
 /* Fast calls on single states: everything that does not change is prepared once. */
-#ifndef MSTMM_ALONE_H
-#define MSTMM_ALONE_H
+#ifndef MSTMM_SINGLE_STATE_H
+#define MSTMM_SINGLE_STATE_H
 
 #include "fused.h"
 #include "scene.h"
@@ -35,8 +35,7 @@ int mstmm_alone_mass(const void *alone, real none, const real *const *rows, real
 /* Total energy at t, q, u, by the engine's loops. */
 int mstmm_alone_energy(const void *alone, real t, const real *const *rows, real *const *answers);
 /* Momentum (3) and angular momentum (3), likewise. */
-int mstmm_alone_momentum(const void *alone, real t, const real *const *rows,
-                         real *const *answers);
+int mstmm_alone_momentum(const void *alone, real t, const real *const *rows, real *const *answers);
 /* Coordinates (nq) after dt from q with constant u, rigid bodies only; quaternions, of any length,
  * rotate at constant angular velocity. */
 int mstmm_alone_moved(const void *alone, real dt, const real *const *rows, real *const *answers);

@@ -1,6 +1,6 @@
 /* Bounds of conditions between two evaluation times. */
-#ifndef MSTMM_BETWEEN_H
-#define MSTMM_BETWEEN_H
+#ifndef MSTMM_EVENT_BOUNDS_H
+#define MSTMM_EVENT_BOUNDS_H
 
 #include "scene.h"
 

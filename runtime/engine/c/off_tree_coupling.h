@@ -1,8 +1,8 @@
 /* Couplings of distant bodies, which the tangent's elimination along the tree does not contain:
  * they are additional unknowns after those of the tree.  Unknown are changes of loads or efforts,
  * which must agree with the solution, and accelerations and multipliers of closing hinges. */
-#ifndef MSTMM_ACROSS_H
-#define MSTMM_ACROSS_H
+#ifndef MSTMM_OFF_TREE_COUPLING_H
+#define MSTMM_OFF_TREE_COUPLING_H
 
 #include "band_lu.h"
 #include "tangent_workspace.h"
@@ -10,7 +10,8 @@
 /* Unit solutions of all unknowns and their coupling matrix, for the factored tangent.  `negative`:
  * whether the determinant of the tree's tangent is negative. */
 int mstmm_across_factor(mstmm_tangent *at, int negative);
-/* x as from mstmm_tangent_solve; in addition rows change by `missing` (NULL: by zero). */
+/* x as from mstmm_tangent_solve, of a tangent that has kept what known increments need; in addition
+ * rows change by `missing` (NULL: by zero). */
 int mstmm_across_solve(mstmm_tangent *at, const real *r, const mstmm_known *known,
                        const real *missing, real *x);
 /* No multiplier changes along the present direction. */
@@ -21,12 +22,10 @@ void mstmm_set_own_apart(const mstmm_tangent *at, real *a, real *own);
 /* Rows of hinges that close loops, of the derivatives' workspace: to `rows`. */
 void mstmm_rows_along(const mstmm_tangent *at, real *workspace, const real *own, real *rows);
 /* Instead of efforts: errors of the accelerations of closing hinges. */
-void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own,
-                   real *required);
+void mstmm_lacking(const mstmm_tangent *at, const real *workspace, const real *own, real *required);
 
 /* Numbers of a row of the loops in a workspace. */
-static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace,
-                                      int row)
+static inline real *mstmm_row_numbers(const mstmm_model *model, real *workspace, int row)
 {
     return workspace + model->loops + MSTMM_ROW * (int64_t)row;
 }

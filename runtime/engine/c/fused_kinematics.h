@@ -1,6 +1,6 @@
 /* Points of a scene by its compiled code: kinematics only, one state at a time. */
-#ifndef MSTMM_POINTS_COMPILED_H
-#define MSTMM_POINTS_COMPILED_H
+#ifndef MSTMM_FUSED_KINEMATICS_H
+#define MSTMM_FUSED_KINEMATICS_H
 
 #include "fused.h"
 #include "mstmm.h"

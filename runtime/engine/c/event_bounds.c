@@ -1,6 +1,6 @@
 /* Bounds of conditions between two evaluation times: first of the quantities that they read, from
  * values and rates at both, then of the conditions, by the tape over intervals. */
-#include "between.h"
+#include "event_bounds.h"
 
 #include <math.h>
 
@@ -27,8 +27,8 @@ static int first_input(const mstmm_scene_run *run)
 static int n_inputs(const mstmm_scene_run *run) { return run->event_tape->input_lengths[4]; }
 
 /* Accelerations of the probes, by the difference of velocities a moment later */
-static void see_accelerations(mstmm_scene_run *run, double t, const double *y, const double *rates,
-                              double *seen)
+static void record_accelerations(mstmm_scene_run *run, double t, const double *y,
+                                 const double *rates, double *seen)
 {
     const int n = run->model->nq + run->model->nu;
     double soon = INFINITY;
@@ -44,11 +44,15 @@ static void see_accelerations(mstmm_scene_run *run, double t, const double *y, c
         }
 }
 
-static void see(void *context, double t, const double *y, const double *rates, double *seen)
+static void record_quantities(void *context, double t, const double *y, const double *rates,
+                              double *seen)
 {
     mstmm_scene_run *run = context;
-    mstmm_state state = {.model = run->model, .workspace = run->workspace, .t = t,
-                         .memory = run->memory, .failure = &run->failure};
+    mstmm_state state = {.model = run->model,
+                         .workspace = run->workspace,
+                         .t = t,
+                         .memory = run->memory,
+                         .failure = &run->failure};
     double *probes = seen + first_probe(run);
     if (run->closes) y = run->probe_values + 6 * run->n_probes + MSTMM_PROBE_NUMBERS;
     seen[0] = t;
@@ -61,10 +65,10 @@ static void see(void *context, double t, const double *y, const double *rates, d
     if (n_inputs(run))
         memcpy(seen + first_input(run), mstmm_input_numbers(&state),
                (size_t)n_inputs(run) * sizeof(real));
-    if (run->later) see_accelerations(run, t, y, rates, probes);
+    if (run->later) record_accelerations(run, t, y, rates, probes);
 }
 
-static mstmm_bounds between(double h, double a, double b, double rate_a, double rate_b)
+static mstmm_bounds quantity_bounds(double h, double a, double b, double rate_a, double rate_b)
 {
     const double chord = (b - a) / h;
     const double lowest = fmin(chord, fmin(rate_a, rate_b));
@@ -74,8 +78,8 @@ static mstmm_bounds between(double h, double a, double b, double rate_a, double 
     return (mstmm_bounds){fmin(a, b) - away, fmax(a, b) + away, lowest - spread, highest + spread};
 }
 
-static void enclose(void *context, double h, const double *left, const double *right,
-                    mstmm_bounds *bounds)
+static void bound_events(void *context, double h, const double *left, const double *right,
+                         mstmm_bounds *bounds)
 {
     mstmm_scene_run *run = context;
     const mstmm_model *model = run->model;
@@ -84,12 +88,12 @@ static void enclose(void *context, double h, const double *left, const double *r
     slots[0] = (mstmm_bounds){left[0], right[0], 1.0, 1.0};
     for (int k = 0; k < run->n_read; k++) {
         const double *a = left + 1 + 2 * k, *b = right + 1 + 2 * k;
-        slots[1 + run->read[k]] = between(h, a[0], b[0], a[1], b[1]);
+        slots[1 + run->read[k]] = quantity_bounds(h, a[0], b[0], a[1], b[1]);
     }
     for (int k = 0; k < run->n_probes; k++) {
         const double *a = left + first_probe(run) + PROBE * k, *b = right + (a - left);
         for (int j = 0; j < (run->later ? 6 : 3); j++)
-            points[6 * k + j] = between(h, a[j], b[j], a[j + 3], b[j + 3]);
+            points[6 * k + j] = quantity_bounds(h, a[j], b[j], a[j + 3], b[j + 3]);
     }
     for (int k = 0; k < n_inputs(run); k++) {
         const double number = left[first_input(run) + k];
@@ -102,6 +106,6 @@ void mstmm_enclose_events(mstmm_scene_run *run, mstmm_system *system)
 {
     if (!run->bounds) return;
     system->n_seen = first_input(run) + n_inputs(run);
-    system->see = see;
-    system->enclose = enclose;
+    system->see = record_quantities;
+    system->enclose = bound_events;
 }

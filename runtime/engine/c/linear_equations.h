@@ -1,8 +1,8 @@
 /* The linear equations of a scene about a state: M da + C du + K dphi = -r_t dt where accelerations
  * change by da, speeds by du, coordinates by N dphi.  By code compiled for the scene, or by
  * directions of the residual. */
-#ifndef MSTMM_LINEAR_HEADER
-#define MSTMM_LINEAR_HEADER
+#ifndef MSTMM_LINEAR_EQUATIONS_H
+#define MSTMM_LINEAR_EQUATIONS_H
 
 #include "fused.h"
 #include "inputs.h"
@@ -26,7 +26,7 @@ typedef struct {
 typedef struct {
     mstmm_linear_code code;
     const real *efforts; /* nu zeros */
-    real *found;         /* mstmm_linear_numbers */
+    real *found; /* mstmm_linear_numbers */
 } mstmm_linear_alone;
 
 /* Numbers that it finds: udot (nu), M, C, K, G (n x n each), r_t (n), qdot (nq). */
@@ -43,8 +43,8 @@ int mstmm_linear_swept(mstmm_tangent *at, real t, const real *q, const real *u, 
  * -M^-1 r_t.  Both are invalid if M is not positive definite. */
 int mstmm_accelerations_about(const mstmm_linear_code *code, real t, const real *q, const real *u,
                               const real *efforts, real *found, real *slopes);
-/* The same for scenes without drives, called as in alone.h: at q and u, udot, the four derivatives
- * separately, G and the identity.  The record is mstmm_linear_alone. */
+/* The same for scenes without drives, called as in single_state.h: at q and u, udot, the four
+ * derivatives separately, G and the identity.  The record is mstmm_linear_alone. */
 int mstmm_linear_derivatives(const void *record, real t, const real *const *rows,
                              real *const *answers);
 /* d/dt (x, x') = matrix (2n x 2n) (x, x') of what mstmm_linear_at found, x' = G x + du where
