@@ -97,8 +97,8 @@ class Motion:
 
 
 _ARRAYS = (
-    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "angular_velocity", "acceleration",
-    "angular_acceleration",
+    "t", "eta", "etad", "etadd", "position", "rotation", "velocity", "angular_velocity",
+    "acceleration", "angular_acceleration",
 )  # fmt: skip
 
 
