@@ -29,8 +29,8 @@ settings.register_profile(
 settings.load_profile("mstmm")
 
 # The comparisons with other programs need those programs, which live in an environment of their
-# own (CONTRIBUTING.md, "Tests"); there `pytest tests/other_programs` runs them.
-collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["other_programs"]
+# own (CONTRIBUTING.md, "Tests"); there `pytest tests/peers` runs them.
+collect_ignore = [] if importlib.util.find_spec("pinocchio") else ["peers"]
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -61,7 +61,7 @@ def pytest_report_header() -> str:
 @pytest.fixture
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
     """Random numbers that depend on the run's seed and on the test's own name alone."""
-    return np.random.default_rng([SEED, *request.node.nodeid.encode()])
+    return np.random.default_rng([SEED, *request.node.name.encode()])
 
 
 @pytest.fixture

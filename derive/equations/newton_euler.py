@@ -8,7 +8,7 @@ agree identically.
 
 Vectors are 3 x 1 columns of components in body axes unless a name says otherwise; SI units.  Source
 for comparison: Jing and Stephansson, Fundamentals of Discrete Element Methods for Rock Engineering,
-Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/book_formulas` compares.
+Elsevier 2007, ch. 2, (2.18) to (2.36); `tests/derive/equations/test_newton_euler.py` compares.
 """
 
 from __future__ import annotations

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference import dae, kane, laws, random_scenes
-from reference import newton_euler as dense
-from reference.compare import drawn, fresh, worst
-from reference.constraints import rows_of
-from reference.histories import integrate
-from reference.jets import Array
-from reference.tree import SIZES, Tree, read
+
+from tests.reference import dae, kane, laws, random_scenes
+from tests.reference import newton_euler as dense
+from tests.reference.compare import drawn, fresh, worst
+from tests.reference.constraints import rows_of
+from tests.reference.histories import integrate
+from tests.reference.jets import Array
+from tests.reference.tree import SIZES, Tree, read
 
 SEEDS = range(12)
 

@@ -1,0 +1,80 @@
+"""Every page of docs/ and the README do what they say: their files, commands and Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.support.pages import PAGES, RUN, SHOWN, Follow, blocks, page_text, play
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES)
+def test_page_runs(page: str, played: Follow) -> None:
+    played(page)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_says_what_it_is(page: str) -> None:
+    text = page_text(page)
+    found = list(blocks(text))
+    fences = sum(line.strip().startswith("```") for line in text.splitlines())
+    assert fences == 2 * (len(found) - text.count("<!-- run first:"))
+    assert text.count("<!-- not run:") == sum(bool(block.reason) for block in found)
+    for block in found:
+        assert block.language in (*RUN, *SHOWN) or block.language.startswith("{"), block
+
+
+PAGE = """\
+`one.py`, a file:
+
+```python
+VALUE = 20
+```
+
+<!-- run first:
+from pathlib import Path
+value = len(Path("one.py").read_text()) + 9
+-->
+
+```python
+value += 1
+print(value)
+```
+
+- in a list
+
+  ```console
+  test -s one.py
+  echo $((1 + 1)) > two.txt
+  ```
+
+<!-- not run: there is no network -->
+```sh
+exit 3
+```
+"""
+
+
+def test_files_python_and_commands_are_followed_in_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("docs.blocks.page_text", lambda page: PAGE)
+    page = play("page.md", tmp_path)
+    assert page.names["value"] == 21 and page.printed == "21\n"
+    assert (page.folder / "two.txt").read_text() == "2\n"
+    assert [block.reason for block in blocks(PAGE)][-1] == "there is no network"
+
+
+def test_a_command_or_a_line_that_fails_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("docs.blocks.page_text", lambda page: "\n```sh\ntrue\nfalse | cat\n```\n")
+    with pytest.raises(AssertionError, match=r"page.md:2\ntrue\nfalse"):
+        play("page.md", tmp_path)
+    monkeypatch.setattr("docs.blocks.page_text", lambda page: "\n\n```python\n\n1 / 0\n```\n")
+    (tmp_path / "again").mkdir()
+    with pytest.raises(ZeroDivisionError) as met:
+        play("page.md", tmp_path / "again")
+    assert met.traceback[-1].lineno == 4  # counted from 0
