@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.c_library import ENGINE, CLibrary, Outcome, build, compile_library, same
+from support.c_library import CLibrary, Outcome, build, same
 
 from mstmm.abi import element_library as abi
 from mstmm.derive.classical.catalogue import CLASSICAL, RUN_ELEMENTS, classical_spec
@@ -22,6 +22,7 @@ from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.ir.json_format import element_from_json
 from mstmm.ir.statements import NEGATIVE_DETERMINANT
 from mstmm.ir.tape import compile_tape
+from mstmm.runtime.kernels import prebuilt_kernels
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 MANIFEST = json.loads((GENERATED / "manifest.json").read_text())
@@ -33,17 +34,16 @@ ON_DEMAND = sorted(set(CLASSICAL) - set(RUN_ELEMENTS))
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> CLibrary:
-    """Compiled with every warning an error, and without contraction, so that bits can agree."""
-    stems = [stem for stem, spec in SPECS.items() if abi.has_c(spec)]
-    sources = [*(GENERATED / f"{stem}.c" for stem in (*stems, "registry")), ENGINE / "tape.c"]
-    target = tmp_path_factory.mktemp("generated") / "all.so"
-    return CLibrary(compile_library(sources, target, f"-I{GENERATED}"))
+def library() -> CLibrary:
+    """As installed: runs call these very functions.  `.ci/sanitize.sh` compiles the same files with
+    every warning an error."""
+    return CLibrary(*prebuilt_kernels.module())
 
 
 @pytest.fixture(scope="module")
 def on_demand(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, ElementSpec], CLibrary]:
-    """The classical matrices that no run uses, and their C, compiled likewise."""
+    """The classical matrices that no run uses, and their C, compiled here with every warning an
+    error and, as what is installed, without contraction."""
     specs = {name: classical_spec(name) for name in ON_DEMAND}
     return specs, build(tmp_path_factory.mktemp("on_demand"), *specs.values())
 
