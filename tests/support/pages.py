@@ -14,6 +14,7 @@ import contextlib
 import io
 import os
 import re
+import shlex
 import subprocess
 import sys
 import textwrap
@@ -26,6 +27,7 @@ import pytest
 
 from mstmm.runtime.integrate import steppers
 from tests.support.paths import ROOT
+from tests.support.preloaded_process import run_command
 
 #: Every page; a new one is found by itself.
 PAGES = [
@@ -126,6 +128,11 @@ def _follow(page: str, block: Block, names: dict[str, Any]) -> None:
     elif block.language == "python":
         lines = "\n" * block.line + block.text  # so that a traceback tells the line of the page
         exec(compile(lines, str(ROOT / page), "exec"), names)
+    elif commands := plain_commands(block.text):
+        for arguments in commands:
+            command = run_command(arguments, Path.cwd())
+            where = f"{page}:{block.line}\n{shlex.join(['mstmm', *arguments])}"
+            assert command.returncode == 0, f"{where}\n{command.stdout}\n{command.stderr}"
     else:
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", block.text],
@@ -133,3 +140,14 @@ def _follow(page: str, block: Block, names: dict[str, Any]) -> None:
         )  # fmt: skip
         where = f"{page}:{block.line}"
         assert done.returncode == 0, f"{where}\n{block.text}\n{done.stdout}\n{done.stderr}"
+
+
+def plain_commands(text: str) -> list[list[str]]:
+    """Arguments of each `mstmm` command, if a block has these alone and needs no shell for them."""
+    lines = text.replace("\\\n", " ").splitlines()
+    words = [found for line in lines if (found := shlex.split(line, comments=True))]
+    plain = all(
+        first == "mstmm" and not re.search(r"[|<>&;$*?~`]", " ".join(more))
+        for first, *more in words
+    )
+    return [more for _, *more in words] if plain else []

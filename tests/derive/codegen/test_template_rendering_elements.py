@@ -20,7 +20,8 @@ from mstmm.ir.interpreter import GuardFailure, evaluate_floats
 from mstmm.ir.json_format import element_from_json
 from mstmm.ir.statements import NEGATIVE_DETERMINANT
 from mstmm.ir.tape import compile_tape
-from tests.support.kernels.c_library import ENGINE, CLibrary, Outcome, build, compile_library, same
+from mstmm.runtime.kernels import prebuilt_kernels
+from tests.support.kernels.c_library import CLibrary, Outcome, build, same
 from tests.support.paths import ROOT
 
 GENERATED = ROOT / "generated"
@@ -33,17 +34,16 @@ ON_DEMAND = sorted(set(CLASSICAL) - set(RUN_ELEMENTS))
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> CLibrary:
-    """Compiled with every warning an error, and without contraction, so that bits can agree."""
-    stems = [stem for stem, spec in SPECS.items() if abi.has_c(spec)]
-    sources = [*(GENERATED / f"{stem}.c" for stem in (*stems, "registry")), ENGINE / "tape.c"]
-    target = tmp_path_factory.mktemp("generated") / "all.so"
-    return CLibrary(compile_library(sources, target, f"-I{GENERATED}"))
+def library() -> CLibrary:
+    """As installed: runs call these very functions.  `.ci/sanitize.sh` compiles the same files with
+    every warning an error."""
+    return CLibrary(*prebuilt_kernels.module())
 
 
 @pytest.fixture(scope="module")
 def on_demand(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, ElementSpec], CLibrary]:
-    """The classical matrices that no run uses, and their C, compiled likewise."""
+    """The classical matrices that no run uses, and their C, compiled here with every warning an
+    error and, as what is installed, without contraction."""
     specs = {name: classical_spec(name) for name in ON_DEMAND}
     return specs, build(tmp_path_factory.mktemp("on_demand"), *specs.values())
 

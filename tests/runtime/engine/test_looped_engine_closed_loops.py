@@ -33,9 +33,19 @@ def smallest_pivot(model: mstmm.Model, q: Any) -> float:
     return float((calls.pivots() / calls.mobility).min())
 
 
-@pytest.mark.parametrize("seed", range(120))
+@pytest.mark.parametrize("seed", range(40))
 def test_random_mechanisms(seed: int) -> None:
     """Accelerations, loads and efforts of all hinges, whichever of them are cut."""
+    check_mechanism(seed)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(40, 400))
+def test_more_random_mechanisms(seed: int) -> None:
+    check_mechanism(seed)
+
+
+def check_mechanism(seed: int) -> None:
     scene, q, u = random_mechanism(seed)
     found = dense.solve(scene, q, u)
     model = mstmm.compile(mstmm.Scene(**copy.deepcopy(scene)))

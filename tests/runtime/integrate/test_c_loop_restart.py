@@ -92,9 +92,9 @@ from pathlib import Path
 from tests.support.integration.compiled_systems import Lab
 from tests.runtime.integrate import test_c_loop_restart as here
 
-folder = Path(sys.argv[1])
+folder, compiled = map(Path, sys.argv[1:])
 method, options = here.CASES["output times"]
-lab = Lab(folder)
+lab = Lab(compiled)
 run = here.bouncing(lab).run(method, 1.5, here.START, **options)
 run.restore(np.load(folder / "state.npz"))
 while run.advance(1.0) == 0:
@@ -114,7 +114,7 @@ def test_another_process_continues_bit_for_bit(lab: Lab, tmp_path: Path) -> None
     np.savez(tmp_path / "state.npz", real=state["real"], integer=state["integer"])
     paths = [str(ROOT), *sys.path]
     done = subprocess.run(
-        [sys.executable, "-c", CONTINUE, str(tmp_path)],
+        [sys.executable, "-c", CONTINUE, str(tmp_path), str(lab.path.parent)],
         env={"PYTHONPATH": ":".join(filter(None, paths)), "PATH": "/usr/bin:/bin"},
         capture_output=True,
         text=True,

@@ -145,6 +145,35 @@ def test_extension_is_built_for_every_python(project: Path) -> None:
     subprocess.run([sys.executable, "-c", script], cwd=project, check=True)
 
 
+def test_what_is_compiled_already_is_not_compiled_again(
+    project: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Until C, or what is installed, is something else."""
+    (project / "mstmm" / "__init__.py").touch()
+    (project / "mstmm" / "generated").symlink_to("../generated")
+    calls, compiler = project / "calls", project / "cc"
+    compiler.write_text(f'#!/bin/sh\necho "$@" >>{calls}\nexec cc "$@"\n')
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+
+    def compiled() -> int:
+        """How often the compiler was called for an object; nothing but the module is left of the
+        last build, as after an install."""
+        calls.write_text("")
+        for folder in [*(project / "build").glob("lib.*"), *(project / "build").glob("temp.*")]:
+            shutil.rmtree(folder)
+        done = build(project)
+        assert done.returncode == 0, done.stderr
+        return sum(" -c " in f" {line} " for line in calls.read_text().splitlines())
+
+    assert (compiled(), compiled()) == (3, 0)
+    source = project / "generated" / "twice.c"
+    source.write_text(source.read_text().replace("2 *", "3 *"))
+    assert (compiled(), compiled()) == (3, 0)
+    (project / "mstmm" / "generated" / "_kernels.abi3.so").write_bytes(b"")
+    assert (compiled(), compiled()) == (3, 0)
+
+
 def test_a_folder_without_c_says_how_to_get_it(project: Path) -> None:
     (project / "generated" / "twice.c").unlink()
     done = build(project)

@@ -63,9 +63,10 @@ class Problem:
 
 
 class Lab:
-    """The compiled library and its test systems."""
+    """The library and its test systems, compiled unless the folder has it."""
 
     def __init__(self, folder: Path, *flags: str) -> None:
+        self.path = folder / "lab.so"
         sources = [*sorted(INTEGRATION.glob("*.c")), *TEST_SYSTEMS]
         self.ffi: Any = cffi.FFI()
         declared = [
@@ -73,7 +74,9 @@ class Lab:
         ]
         self.ffi.cdef("\n".join([*declared, TEST_DECLARATIONS]))
         options = ("-O2", f"-I{INTEGRATION}", f"-I{HERE}", *flags)
-        self.lib: Any = self.ffi.dlopen(str(compile_library(sources, folder / "lab.so", *options)))
+        if not self.path.exists():
+            compile_library(sources, self.path, *options)
+        self.lib: Any = self.ffi.dlopen(str(self.path))
 
     def problem(self, rhs: str, n: int, *p: float, n_error: int | None = None) -> Problem:
         """A system of `systems.c` with its parameters."""

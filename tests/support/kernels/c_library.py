@@ -44,7 +44,14 @@ def build(folder: Path, *specs: ElementSpec, flags: Sequence[str] = ()) -> CLibr
     write_generated(specs, folder)
     stems = [*(f"{spec.kind}_{spec.name}" for spec in specs), "registry"]
     sources = [*(folder / f"{stem}.c" for stem in stems), ENGINE / "tape.c"]
-    return CLibrary(compile_library(sources, folder / "elements.so", f"-I{folder}", *flags))
+    return open_library(compile_library(sources, folder / "elements.so", f"-I{folder}", *flags))
+
+
+def open_library(path: Path) -> CLibrary:
+    """A shared library of generated elements and the tape interpreter."""
+    ffi = cffi.FFI()
+    ffi.cdef(abi.cdef(registry=True, tape=True))
+    return CLibrary(ffi, ffi.dlopen(str(path)))
 
 
 @dataclass(frozen=True)
@@ -58,11 +65,8 @@ class Outcome:
 class CLibrary:
     """An opened library of generated elements: calls go through the descriptors."""
 
-    def __init__(self, path: Path) -> None:
-        self.ffi = cffi.FFI()
-        self.ffi.cdef(abi.cdef(registry=True, tape=True))
-        lib: Any = self.ffi.dlopen(str(path))
-        self.lib = lib
+    def __init__(self, ffi: Any, lib: Any) -> None:
+        self.ffi, self.lib = ffi, lib
         table = [lib.mstmm_elements[i] for i in range(lib.mstmm_element_count)]
         #: Descriptors by name, and by kind_name.
         self.elements: dict[str, Any] = {self.text(e.name): e for e in table}

@@ -1,38 +1,29 @@
 """Every example checks its own statement; here each is run as a user would run it."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from tests.support.paths import EXAMPLES
+from tests.support.preloaded_process import run_script
 
 CHECKS = sorted(EXAMPLES.glob("*/check.py"))
 PICTURES = sorted(EXAMPLES.glob("*/picture.py"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("script", CHECKS, ids=lambda script: script.parent.name)
 def test_example(script: Path, tmp_path: Path) -> None:
-    run = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
+    run = run_script(script, [], tmp_path)
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
     assert run.stdout, "an example says what it measured"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("script", PICTURES, ids=lambda script: script.parent.name)
 def test_picture(script: Path, tmp_path: Path) -> None:
     target = tmp_path / "new.png"
-    run = subprocess.run(
-        [sys.executable, "-W", "error", str(script), str(target)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
+    run = run_script(script, [str(target)], tmp_path)
     assert run.returncode == 0, f"{run.stdout}\n{run.stderr}"
     assert target.read_bytes().startswith(b"\x89PNG"), "a picture was drawn"
     assert (script.parent / "picture.png").is_file(), "the README shows one"

@@ -39,12 +39,16 @@ def compare(
     assert abs(result.energy()[0] - energy) < ACCURACY * max(abs(energy), 1.0)
 
 
-@pytest.mark.parametrize("seed", range(8))
+#: Of seeds beyond the first.
+MORE = [pytest.param(seed, marks=pytest.mark.soak) for seed in range(5, 20)]
+
+
+@pytest.mark.parametrize("seed", [*range(5), *MORE])
 def test_spatial_trees(seed: int) -> None:
     compare(random_beams.random_system(seed), seed)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [*range(5), *MORE])
 def test_planar_trees(seed: int) -> None:
     compare(random_beams.random_system(seed, planar=True), seed)
 
