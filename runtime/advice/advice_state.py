@@ -100,7 +100,7 @@ class AdviceState:
         except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
             return None
 
-    def evidence(
+    def error_predictions(
         self, one_way: Result | None, richest: Model
     ) -> tuple[dict[str, ErrorPrediction], str]:
         """Error estimates by body from a run with one-way coupling, and why there are none, or "".

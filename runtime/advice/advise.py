@@ -71,7 +71,7 @@ def make_advice(
     state.size = motion_size(state.measure, one_way)
     predictions = predict_errors(one_way, state.length)[0]
     state.runner, base = _make_runner(state, top, richest, predictions, report_status)
-    evidence, reason = state.evidence(one_way, richest)
+    evidence, reason = state.error_predictions(one_way, richest)
     if reason:
         state.notes.append(f"no error estimates for the flexible bodies: {reason}")
     base = reduce_to_plane(state, top, richest, base)

@@ -152,7 +152,7 @@ def _compare_with_parts(
         f"one frame its error is {single_frame_error:.1e}" + _renamed_ends(beam, split.names)
         for beam, parts in parts_by_beam.items()
     ))  # fmt: skip
-    evidence, reason = state.evidence(state.run_one_way(split.scene), tried.compiled_model)
+    evidence, reason = state.error_predictions(state.run_one_way(split.scene), tried.compiled_model)
     if reason:
         state.notes.append(f"no error estimates for the parts of beams: {reason}")
     return tried, evidence
