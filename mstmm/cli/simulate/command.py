@@ -285,7 +285,7 @@ def simulate(
             result = save_result(plan, result, seconds, progress)
     if plan.plot is not None:
         result.plot(*plan.quantities, path=plan.plot, title=Path(plan.scene).stem)
-    report_run(plan, result, seconds + result.trajectory.start_findings, json, rejection)
+    report_run(plan, result, seconds + result.trajectory.earlier_seconds, json, rejection)
     if was_interrupted(result):
         raise typer.Exit(130)
     if not result.success:

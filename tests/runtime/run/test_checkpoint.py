@@ -201,10 +201,10 @@ def test_the_time_of_all_pieces_is_kept(
             run = model.simulate(5.0, checkpoint=path, resume=at > 1, step=0.01, method="rk4")
         with np.load(path) as file:
             assert file["seconds"] > (5000.0 if at > 1 else 0.0)
-        assert run.trajectory.start_findings == (5000.0 if at > 1 else 0.0)
+        assert run.trajectory.earlier_seconds == (5000.0 if at > 1 else 0.0)
         spend(path, 5000.0)
     run = model.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
-    assert run.success and run.trajectory.start_findings == 5000.0
+    assert run.success and run.trajectory.earlier_seconds == 5000.0
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.97])
