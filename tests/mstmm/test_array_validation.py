@@ -173,8 +173,7 @@ def test_a_batch_of_none(model: mstmm.Model) -> None:
 
 
 def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
-    run = model.simulate(np.float32(0.5), rtol=np.float64(1e-6), max_steps=np.int64(1000),
-                         output_times=np.array([0, 0.5], np.float32), max_step=np.inf)  # fmt: skip
+    run = model.simulate(np.float32(0.5), mstmm.methods.Method(max_steps=np.int64(1000), max_step=np.inf), rtol=np.float64(1e-6), output_times=np.array([0, 0.5], np.float32))  # fmt: skip
     assert run.success and list(run.t) == [0.0, 0.5]
 
 

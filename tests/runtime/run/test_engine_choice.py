@@ -97,9 +97,9 @@ def test_an_interrupted_run_on_compiled_code_continues_bit_for_bit(
         calls.append(t)
         os.kill(os.getpid(), signal.SIGINT)
 
-    cut = fused.simulate(progress=interrupt, **settings)
+    cut = fused.simulate(execution=mstmm.Execution(progress=interrupt), **settings)
     assert calls
     assert cut.status is None
     with pytest.raises(EnvironmentFailure, match="began on fused code, which cannot be compiled"):
-        model("looped").simulate(resume=True, **settings)
-    assert equal(fused.simulate(resume=True, **settings), whole)
+        model("looped").simulate(execution=mstmm.Execution(resume=True), **settings)
+    assert equal(fused.simulate(execution=mstmm.Execution(resume=True), **settings), whole)

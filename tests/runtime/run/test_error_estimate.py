@@ -170,13 +170,16 @@ def test_estimates_of_random_scenes(method: str, rng: np.random.Generator) -> No
         seed = int(rng.integers(10**6))
         data = random_scene(seed, most=4)
         model, start = mstmm.compile(mstmm.Scene.from_data(data)), random_state(data, seed)
-        run = model.simulate(0.3, method, rtol=1e-6, certify=True, initial=start, max_steps=2000)
+        run = model.simulate(
+            0.3,
+            mstmm.methods.Method(method, max_steps=2000),
+            rtol=1e-6,
+            certify=True,
+            initial=start,
+        )
         if not run.success:
             continue
-        best = model.simulate(
-            0.3, rtol=1e-13, atol=1e-15, initial=start, output_times=np.unique(run.t),
-            max_steps=20_000,
-        )  # fmt: skip
+        best = model.simulate(0.3, mstmm.methods.Method(max_steps=20_000), rtol=1e-13, atol=1e-15, initial=start, output_times=np.unique(run.t))  # fmt: skip
         if not best.success:
             continue
         true = compare(model.coordinate_layout, run.trajectory, best.trajectory, "")

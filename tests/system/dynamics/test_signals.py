@@ -256,9 +256,12 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
         "checkpoint": tmp_path / "run.npz",
     }
     whole = model.simulate(**settings)
-    cut = model.simulate(progress=lambda *_: os.kill(os.getpid(), signal.SIGINT), **settings)
+    cut = model.simulate(
+        execution=mstmm.Execution(progress=lambda *_: os.kill(os.getpid(), signal.SIGINT)),
+        **settings,
+    )
     assert cut.status is None
-    again = model.simulate(resume=True, **settings)
+    again = model.simulate(execution=mstmm.Execution(resume=True), **settings)
     for name in ("t", "q", "u", "work"):
         np.testing.assert_array_equal(getattr(again, name), getattr(whole, name))
 

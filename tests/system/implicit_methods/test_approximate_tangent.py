@@ -59,7 +59,9 @@ def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
     exact = model.simulate(0.5, rtol=1e-13, atol=1e-14, output_times=[0.5]).q
     errors = []
     for count in (32, 128):
-        run = model.simulate(0.5, method, 0.5 / count, output_times=[0.5], tangent="laws")
+        run = model.simulate(
+            0.5, mstmm.methods.method(method, tangent="laws"), 0.5 / count, output_times=[0.5]
+        )
         assert run.success, run.message
         assert run.statistics is not None
         assert run.statistics.approximate_tangents == run.statistics.tangents == count
@@ -99,7 +101,11 @@ def test_where_laws_do_not_contract_exact_tangents_follow() -> None:
 
     def run(tangent: str) -> Statistics:
         found = model.simulate(
-            0.3, "genalpha", 0.02, initial=(q, u), output_times=[0.3], tangent=tangent
+            0.3,
+            mstmm.methods.GeneralizedAlpha("genalpha", tangent=tangent),
+            0.02,
+            initial=(q, u),
+            output_times=[0.3],
         )
         assert found.success, found.message
         assert found.statistics is not None
@@ -120,7 +126,12 @@ def test_an_iteration_by_laws_is_a_residual_and_a_solution() -> None:
     model = compiled({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
     steps = 100
     for tangent in ("exact", "laws"):
-        run = model.simulate(0.5, "genalpha", 0.5 / steps, output_times=[0.5], tangent=tangent)
+        run = model.simulate(
+            0.5,
+            mstmm.methods.GeneralizedAlpha("genalpha", tangent=tangent),
+            0.5 / steps,
+            output_times=[0.5],
+        )
         counts = run.statistics
         assert counts is not None
         assert counts.tangents == 1
@@ -190,7 +201,9 @@ def test_methods_that_need_the_exact_one_say_so() -> None:
 
 def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
     model = compiled(everything())
-    result = model.simulate(0.1, "rodas4pw", rtol=1e-4, atol=1e-7, tangent="laws")
+    result = model.simulate(
+        0.1, mstmm.methods.Implicit("rodas4pw", tangent="laws"), rtol=1e-4, atol=1e-7
+    )
     result.save(tmp_path / "by_laws.nc")
     loaded = mstmm.load_result(tmp_path / "by_laws.nc")
     assert loaded.statistics == result.statistics

@@ -75,9 +75,11 @@ def test_a_run_resumed_from_a_file_has_the_bytes_of_a_whole_one(
     whole = model.simulate(1.0, method, **how)
     with monkeypatch.context() as patch:
         interrupted(patch, 0.4)
-        cut = model.simulate(1.0, method, checkpoint=path, **how)
+        cut = model.simulate(1.0, method, execution=mstmm.Execution(checkpoint=path), **how)
     assert cut.status is None and 0.4 < cut.t[-1] < 1.0
-    rest = model.simulate(1.0, method, checkpoint=path, resume=True, **how)
+    rest = model.simulate(
+        1.0, method, execution=mstmm.Execution(checkpoint=path, resume=True), **how
+    )
     assert rest.success, rest.message
     for name in ("t", "q", "u", "work", "event"):
         assert getattr(whole, name).tobytes() == getattr(rest, name).tobytes(), name

@@ -83,10 +83,7 @@ def swung() -> mstmm.Model:
 def test_printed_equations(radius: float, swung: mstmm.Model) -> None:
     h, steps = 0.02, 60
     q, u, _ = printed(radius, h, steps)
-    result = swung.simulate(
-        h * steps, "genalpha-index3", step=h, radius=radius, rtol=1e-12, atol=1e-13,
-        output_times=np.linspace(0.0, h * steps, steps + 1),
-    )  # fmt: skip
+    result = swung.simulate(h * steps, mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius), step=h, rtol=1e-12, atol=1e-13, output_times=np.linspace(0.0, h * steps, steps + 1))  # fmt: skip
     assert result.success, result.message
     # Iterations with fixed steps end at 1e-3 of a step's error.
     assert np.abs(result.q[:, :3] - q).max() < 3e-6
@@ -143,7 +140,12 @@ def test_energy_falls_as_slowly() -> None:
     lost = {}
     for method in ("genalpha", "genalpha-index3"):
         for radius in (0.5, 0.9):
-            run = model.simulate(20.0, method, step=5e-3, radius=radius, output_times=[0.0, 20.0])
+            run = model.simulate(
+                20.0,
+                mstmm.methods.method(method, radius=radius),
+                step=5e-3,
+                output_times=[0.0, 20.0],
+            )
             assert run.success, run.message
             energy = run.energy_components()["kinetic"]
             lost[method, radius] = 1 - float(energy[1] / energy[0])
@@ -209,7 +211,9 @@ def test_a_break_just_before_the_grid(method: str, before: float, bar: mstmm.Mod
 
 def off_in_ticks(model: mstmm.Model, tick: float, step: float, radius: float) -> float:
     """`off` of a session in ticks of `tick` s."""
-    session = model.session(method="genalpha-index3", step=step, radius=radius)
+    session = model.session(
+        method=mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius), step=step
+    )
     exact, errors = model.session(method="dop853", rtol=1e-11, atol=1e-13), []
     while session.t < END:
         session.advance(tick)
