@@ -15,6 +15,7 @@ from mstmm.array_validation import Array, batch, finite_float, integer, single_s
 from mstmm.defaults import ATOL, METHOD, RTOL
 from mstmm.errors import NumericalFailure
 from mstmm.notebook_html import NotebookDisplay, table
+from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk
 
 from ..engine.input_values import InputValue
@@ -35,12 +36,29 @@ if TYPE_CHECKING:
     from .target_error.error_request import ErrorRequest
 
 
-class Model(LinearAnalysis, NotebookDisplay):
+class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
     """Compiled scene; created by `mstmm.compile`.
 
     `q` and `u` hold the hinges in the scene's order (`coordinate_layout`); SI units and radians;
     speeds and quaternions of ball and free hinges in outboard axes, quaternions w, x, y, z.
+
+    Attributes:
+        scene: the scene.
+        sweep: sweep in use, "riccati", "refined", "qr" or "product".
     """
+
+    member_groups = {
+        "Description": "scene nq nu coordinate_layout parameters loops flexible_bodies "
+        "free_speed_indices simplifications engine engine_reason sweep",
+        "States": "initial_state assemble assemble_path equilibrium integrate tangent_increments",
+        "Dynamics": "accelerations solve mass_matrix bias_efforts gravity_efforts inverse_dynamics "
+        "derivatives energy energy_components momentum",
+        "Kinematics": "positions poses velocities jacobian jacobian_rate",
+        "Simulation": "simulate simulate_batch session",
+        "Linear analysis": "linearize modes dynamic_stiffness_modes frequency_response root_locus "
+        "stability_limit waterfall unbalance_response",
+        "Copies with other values": "with_inputs with_parameters",
+    }
 
     def __repr__(self) -> str:
         return f"<Model: {self.scene.summary}, {self._mobility} degrees of freedom; {self.engine}>"
