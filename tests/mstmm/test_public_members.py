@@ -37,7 +37,8 @@ def test_dir_shows_documented_members(
     shown = [name for name in dir(objects[cls]) if not name.startswith("_")]
     assert shown == sorted(names)
     tables = {*mstmm.Scene.model_fields} if cls is mstmm.Scene else set()
-    attributes = set(re.findall(r"[a-z]\w*", (cls.__doc__ or "").partition("Attributes:")[2]))
+    texts = [(base.__doc__ or "").partition("Attributes:")[2] for base in cls.__mro__]
+    attributes = set(re.findall(r"[a-z]\w*", " ".join(texts)))
     for name in {*names} - tables - attributes:
         assert inspect.getdoc(inspect.getattr_static(cls, name)), name
     pages = [page.read_text(encoding="utf-8") for page in API.glob("*.md")]

@@ -36,7 +36,7 @@ def test_a_pulse_that_was_passed_over(effort: str, passed: bool, times: Any) -> 
 
 
 def test_short_steps_see_it() -> None:
-    assert not told(PULSE, max_step=1e-3)
+    assert not told(PULSE, method=mstmm.methods.Method(max_step=1e-3))
     assert not told(PULSE, method="rk4", step=1e-3)
     assert told(PULSE, method="rk4", step=0.05)
     assert told(PULSE, method="rk4", step=0.05, output_times=[10.0])

@@ -86,7 +86,7 @@ def test_a_run_is_refused_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> 
         'hinge "motor"',
         True,
     )
-    assert risk.figure > risk.limit and "use a step below" in risk.remedy
+    assert risk.value > risk.limit and "use a step below" in risk.remedy
     assert seen.value.result is None
     assert isinstance(seen.value, mstmm.NumericalFailure)
 
@@ -107,7 +107,7 @@ def test_a_wanted_error_that_is_not_reached_is_refused() -> None:
         mstmm.compile(pins(3, [1.0, 2.0, -1.0])).simulate(
             60.0, error=1e-9, execution=mstmm.Execution(on_risk="refuse")
         )
-    assert seen.value.result.error_estimate is not None
+    assert seen.value.result.achieved_error is not None
 
 
 def test_what_is_only_worth_knowing_refuses_nothing() -> None:

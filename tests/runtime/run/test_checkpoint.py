@@ -28,10 +28,12 @@ import numpy as np
 import mstmm
 scene, out, mode, t_end = sys.argv[1:]
 model = mstmm.compile(mstmm.load_scene(scene))
-more = {} if mode == "full" else {"checkpoint": out + ".ck.npz", "resume": mode == "resume"}
-if mode == "cut":
-    more["progress"] = lambda t, end: (print(t, flush=True), sys.stdin.readline())
-run = model.simulate(float(t_end), rtol=1e-11, atol=1e-13, **more)
+pause = lambda t, end: (print(t, flush=True), sys.stdin.readline())
+execution = mstmm.Execution(
+    progress=pause if mode == "cut" else None, resume=mode == "resume",
+    checkpoint=None if mode == "full" else out + ".ck.npz",
+)
+run = model.simulate(float(t_end), rtol=1e-11, atol=1e-13, execution=execution)
 print(run.message)
 arrays = {n: getattr(run, n) for n in ("t", "q", "u", "work", "event")}
 np.savez(out, memory=run.trajectory.memory, energy=run.energy(), **arrays)

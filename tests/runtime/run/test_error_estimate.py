@@ -179,7 +179,14 @@ def test_estimates_of_random_scenes(method: str, rng: np.random.Generator) -> No
         )
         if not run.success:
             continue
-        best = model.simulate(0.3, mstmm.methods.Method(max_steps=20_000), rtol=1e-13, atol=1e-15, initial=start, output_times=np.unique(run.t))  # fmt: skip
+        best = model.simulate(
+            0.3,
+            mstmm.methods.Method(max_steps=20_000),
+            rtol=1e-13,
+            atol=1e-15,
+            initial=start,
+            output_times=np.unique(run.t),
+        )
         if not best.success:
             continue
         true = compare(model.coordinate_layout, run.trajectory, best.trajectory, "")

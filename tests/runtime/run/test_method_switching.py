@@ -287,7 +287,7 @@ def test_what_makes_no_sense_with_it_is_refused() -> None:
     with pytest.raises(mstmm.SceneError, match="chooses its steps"):
         model.simulate_batch(state, t_end=1.0, method="auto", step=0.01)
     with pytest.raises(mstmm.SceneError, match='method "auto" has no such parameter'):
-        model.simulate(1.0, method=mstmm.methods.method("auto", radius=0.5))
+        model.simulate(1.0, method=mstmm.methods.GeneralizedAlpha("auto", radius=0.5))
     with pytest.raises(mstmm.SceneError, match="available are: auto, rk4"):
         model.simulate(1.0, method="automatic")
     with pytest.raises(ValueError, match="'auto' exists already"):

@@ -60,7 +60,7 @@ def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
     errors = []
     for count in (32, 128):
         run = model.simulate(
-            0.5, mstmm.methods.method(method, tangent="laws"), 0.5 / count, output_times=[0.5]
+            0.5, mstmm.methods.Implicit(method, tangent="laws"), 0.5 / count, output_times=[0.5]
         )
         assert run.success, run.message
         assert run.statistics is not None
@@ -69,8 +69,11 @@ def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
     assert np.log2(errors[0] / errors[1]) / 2 > get(method).order - 0.25, errors
 
 
-def counted(model: mstmm.Model, method: str, **how: Any) -> tuple[Any, Statistics]:
-    run = model.simulate(0.4, method, output_times=[0.2, 0.4], **how)
+def counted(
+    model: mstmm.Model, method: str, tangent: str = "auto", **how: Any
+) -> tuple[Any, Statistics]:
+    chosen = mstmm.methods.Implicit(method, tangent=tangent)
+    run = model.simulate(0.4, chosen, output_times=[0.2, 0.4], **how)
     assert run.success, run.message
     assert run.statistics is not None
     return run.q, run.statistics
@@ -213,9 +216,11 @@ def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
 def test_a_batch_takes_it_too() -> None:
     model = compiled(everything())
     q, u = model.initial_state()
-    how: dict[str, Any] = {"method": "rodas4pw", "step": 0.01, "tangent": "laws"}
-    batch = model.simulate_batch((q[None], u[None]), t_end=0.2, **how)
-    alone = model.simulate(0.2, output_times=[0.2], **how)
+    by_laws, by_all = (
+        mstmm.methods.Implicit("rodas4pw", tangent=tangent) for tangent in ("laws", "exact")
+    )
+    batch = model.simulate_batch((q[None], u[None]), t_end=0.2, method=by_laws, step=0.01)
+    alone = model.simulate(0.2, by_laws, step=0.01, output_times=[0.2])
     assert batch.q[0, -1] == pytest.approx(alone.q[-1], abs=1e-12)
-    exact = model.simulate(0.2, output_times=[0.2], **{**how, "tangent": "exact"})
+    exact = model.simulate(0.2, by_all, step=0.01, output_times=[0.2])
     assert np.abs(exact.q[-1] - alone.q[-1]).max() > 1e-12

@@ -46,13 +46,13 @@ def test_a_batch_takes_numbers_of_the_scene_and_a_radius() -> None:
     name = "hinge0.law.stiffness[0]"
     q, u = model.initial_state()
     starts = np.tile(q, (3, 1)), u
-    how: dict[str, Any] = {"method": "genalpha", "step": 0.01, "radius": 0.5}
+    how: dict[str, Any] = {"method": mstmm.methods.GeneralizedAlpha(radius=0.5), "step": 0.01}
     batch = model.simulate_batch(starts, {name: stiffness}, t_end=0.3, output_times=[0.3], **how)
     assert batch.success.all()
     for i in range(3):
         alone = model.with_parameters({name: stiffness[i]}).simulate(0.3, output_times=[0.3], **how)
         assert batch.q[i] == pytest.approx(alone.q, abs=1e-9)
-    how["radius"] = 0.1
+    how["method"] = mstmm.methods.GeneralizedAlpha(radius=0.1)
     other = model.simulate_batch(starts, {name: stiffness}, t_end=0.3, output_times=[0.3], **how)
     assert np.abs(other.q - batch.q).max() > 1e-7
 

@@ -141,4 +141,6 @@ def test_a_radius_is_asked_of_methods_that_take_one() -> None:
         with pytest.raises(
             SceneError, match="has no such parameter; methods with a radius are genalpha, dttmm"
         ):
-            model.simulate(0.1, mstmm.methods.method(method, radius=0.5))
+            model.simulate(0.1, mstmm.methods.GeneralizedAlpha(method, radius=0.5))
+        with pytest.raises(SceneError, match=f'radius: method "{method}" has no such option'):
+            mstmm.methods.method(method, radius=0.5)

@@ -221,7 +221,12 @@ def test_by_laws_alone_the_order_falls(method: str, order: int) -> None:
 @pytest.mark.parametrize("method", ["ros34pw2", "rodas4pw"])
 def test_steps_by_laws_are_those_of_a_run_where_it_offers_them(method: str) -> None:
     arm, n = elbow_with_spring(1e5, 2e3), 32
-    run = arm.simulate(ELBOW_END, mstmm.methods.method(method, tangent="laws"), ELBOW_END / n, output_times=[ELBOW_END])  # fmt: skip
+    run = arm.simulate(
+        ELBOW_END,
+        mstmm.methods.Implicit(method, tangent="laws"),
+        ELBOW_END / n,
+        output_times=[ELBOW_END],
+    )
     assert (
         np.abs(
             LawTangentSteps(arm, method).fixed_step_states(ELBOW_END / n, n)[-1, 0] - run.q[-1]

@@ -353,10 +353,9 @@ def test_a_run_without_it_tells_nothing() -> None:
         ({"error": 1e-6, "method": "rk4"}, "has fixed steps"),
         ({"error": 1e-6, "method": "dttmm-classical"}, "has fixed steps"),
         ({"error": 1e-6, "method": "dop835"}, "not known"),
-        ({"error": 1e-6, "checkpoint": "x"}, "no checkpoint"),
-        ({"error": 1e-6, "resume": True}, "no checkpoint"),
-        ({"error": 1e-6, "error_of": "rod0.tipp.x"}, "did you mean"),
-        ({"error_of": "energy"}, "give error too"),
+        ({"error": 1e-6, "execution": mstmm.Execution(checkpoint="x")}, "no checkpoint"),
+        ({"error": 1e-6, "execution": mstmm.Execution(resume=True)}, "no checkpoint"),
+        ({"error": mstmm.ErrorRequest(1e-6, of="rod0.tipp.x")}, "did you mean"),
     ],
 )
 def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> None:
