@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SETTINGS: list[dict[str, Any]] = [
     {"method": "dop853", "rtol": 1e-6, "atol": 1e-9},
     {"method": "dop853", "rtol": 1e-9, "atol": 1e-12},
-    {"method": "dop853", "rtol": 1e-6, "atol": 1e-9, "max_step": 0.05},
+    {"method": mstmm.methods.Method("dop853", max_step=0.05), "rtol": 1e-6, "atol": 1e-9},
     {"method": "dopri5", "rtol": 1e-5, "atol": 1e-8},
     {"method": "dopri5", "rtol": 1e-9, "atol": 1e-12},
     {"method": "rk4", "step": 0.02},
