@@ -186,9 +186,10 @@ def test_a_batch_of_none(model: mstmm.Model) -> None:
 
 
 def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
+    limits: dict[str, Any] = {"max_steps": np.int64(1000), "max_step": np.inf}
     run = model.simulate(
         np.float32(0.5),
-        mstmm.methods.Method(max_steps=np.int64(1000), max_step=np.inf),
+        mstmm.methods.Method(**limits),
         rtol=np.float64(1e-6),
         output_times=np.array([0, 0.5], np.float32),
     )
