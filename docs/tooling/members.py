@@ -20,7 +20,7 @@ class MemberGroups(SphinxDirective):
         path = self.arguments[0]
         module, _, name = path.rpartition(".")
         cls = getattr(import_module(module), name)
-        lines = [f".. autoclass:: {path}", "   :no-members:", ""]
+        lines = [f".. autoclass:: {path}", "   :no-members:", "   :no-inherited-members:", ""]
         for group, members in cls.public_members().items():
             lines += ["", f".. rubric:: {group}", ""]
             for member in members:

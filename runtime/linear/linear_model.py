@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +33,7 @@ from .validity import find_linear_risks
 class Linear(PublicMembers, StateSpace):
     """Linear model about an operating point: matrices, modes, responses; see `LinearEquations`."""
 
-    member_groups = {
+    member_groups: ClassVar[Mapping[str, str]] = {
         "Description": "model state frame coordinate_names coordinate_units input_names "
         "disturbance_names state_names prescribed_coordinates "
         "free_speed_indices position_states velocity_states",

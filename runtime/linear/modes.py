@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class Modes(PublicMembers, AssessedResult):
         count: requested number of modes; None for all.
     """
 
-    member_groups = {
+    member_groups: ClassVar[Mapping[str, str]] = {
         "Modes": "eigenvalues omega frequency damping_ratio shapes whirl unstable "
         "is_undamped is_complete count frame linear lowest",
         "Participation": "dominant_coordinates kinetic_energy_shares strain_energy_shares "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,7 +47,7 @@ class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
         sweep: sweep in use, "riccati", "refined", "qr" or "product".
     """
 
-    member_groups = {
+    member_groups: ClassVar[Mapping[str, str]] = {
         "Description": "scene nq nu coordinate_layout parameters loops flexible_bodies "
         "free_speed_indices simplifications engine engine_reason sweep",
         "States": "initial_state assemble assemble_path equilibrium integrate tangent_increments",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy as shallow
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Never, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Never, Self
 
 import numpy as np
 
@@ -58,7 +58,7 @@ class Session(PublicMembers):
         settings: method and steps.
     """
 
-    member_groups = {
+    member_groups: ClassVar[Mapping[str, str]] = {
         "State": "t q u state model settings",
         "Advance": "advance inputs stop_reason copy",
         "Results": "outputs result risks warnings",

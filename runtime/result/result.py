@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mstmm.argument_validation import require_path
 from mstmm.notebook_html import NotebookDisplay, table
@@ -40,7 +40,7 @@ class Result(PublicMembers, Record, NotebookDisplay):
         checkpoint: the file that stores the run until its result is saved; None without one.
     """
 
-    member_groups = {
+    member_groups: ClassVar[Mapping[str, str]] = {
         "Run": "model settings success status message statistics method_history "
         "achieved_error last_state checkpoint",
         "Samples": "t q u udot event coordinates speeds coordinate_info",
