@@ -72,13 +72,16 @@ class Single:
         return f"{self.model}, {self.method} {self.rtol:.0e}"
 
 
-def timed(model: mstmm.Model, t_end: float, **options: Any) -> tuple[mstmm.Result, float] | None:
+def timed(
+    model: mstmm.Model, t_end: float, method: str, **options: Any
+) -> tuple[mstmm.Result, float] | None:
     """A run and the processor time of the call, with the elastic response where there is one; None
     where it does not reach the end."""
     times = np.linspace(0.0, t_end, SAMPLES)
+    limited = mstmm.methods.Method(method, max_steps=_MOST_STEPS)
     begin = time.process_time()
     try:
-        result = model.simulate(t_end, output_times=times, max_steps=_MOST_STEPS, **options)
+        result = model.simulate(t_end, limited, output_times=times, **options)
         if isinstance(result, OneWayResult) and result.success:
             _ = result.cost
     except mstmm.MstmmError:

@@ -75,9 +75,8 @@ def single(
 ) -> tuple[mstmm.Result, float] | None:
     """One run of a method at a tolerance; None where it does not reach the end in `most` steps."""
     try:
-        result, spent = timed(
-            model, t_end, method=method, rtol=rtol, atol=ATOL_PART * rtol, max_steps=most
-        )
+        limited = mstmm.methods.Method(method, max_steps=most)
+        result, spent = timed(model, t_end, method=limited, rtol=rtol, atol=ATOL_PART * rtol)
     except mstmm.MstmmError:
         return None
     return (result, spent) if result.success else None

@@ -98,7 +98,8 @@ def _warm(model: mstmm.Model, t_end: float) -> None:
     for name in all_methods():
         if family(name) not in OTHERS:
             with suppress(mstmm.MstmmError):
-                model.simulate(t_end, method=name, output_times=[t_end], max_steps=2)
+                two_steps = mstmm.methods.Method(name, max_steps=2)
+                model.simulate(t_end, two_steps, output_times=[t_end])
 
 
 def _quiet(_: str) -> None:

@@ -15,6 +15,7 @@ from ..chart.pareto_front import bound_errors, recommend
 from ..chart.repeated_timing import repeat_timings
 from ..chart.time_budget import ALL, EARLY, Budget, OutOfTime
 from ..chart.trial_run import Runs
+from ..model.target_error.error_request import ErrorRequest
 from .measure_renaming import rename_reference
 from .trial_models import TrialResult, TrialRunner
 
@@ -103,7 +104,7 @@ def _setting_for_error(
 ) -> Setting | None:
     """Setting that `simulate` selects for an integration error; None if it fails."""
     try:
-        options = {"error": error, "error_of": of}
+        options = {"error": ErrorRequest(error, of)}
         result, _ = runs.simulate_with(tried.compiled_model, options, runs.budget.run_limit(ALL))
     except (OutOfTime, MstmmError, ArithmeticError, np.linalg.LinAlgError):
         return None

@@ -16,6 +16,7 @@ from mstmm.scene import Scene
 from mstmm.scene.checks.flexible_bodies import short_beam_warnings
 
 from ..integrate.c_loop import Status
+from ..model.execution import Execution
 from ..platform_support.interrupts import record_interrupts
 from ..result.error_measure import Measure
 from ..result.one_way.result import OneWayResult
@@ -100,7 +101,8 @@ class Runs:
         alarm = self.budget.alarm(limit)
         with record_interrupts() as interrupted:  # short runs do not check for it
             begin = time.process_time()
-            result = model.simulate(self.t_end, output_times=times, progress=alarm, **options)
+            execution = Execution(progress=alarm)
+            result = model.simulate(self.t_end, output_times=times, execution=execution, **options)
             if isinstance(result, OneWayResult) and result.is_comparable:
                 _ = result.cost  # computes the elastic response, which is part of the CPU time
             spent = time.process_time() - begin

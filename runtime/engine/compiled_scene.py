@@ -183,10 +183,12 @@ class CompiledScene:
 
     @property
     def nq(self) -> int:
+        """Number of coordinates."""
         return self.looped.nq
 
     @property
     def nu(self) -> int:
+        """Number of speeds."""
         return self.looped.nu
 
     @property

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from mstmm.argument_validation import abbreviate
 from mstmm.array_validation import Array
 from mstmm.errors import SceneError
+from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk
 
 from ..packing.coordinate_layout import check_dense_size
@@ -29,8 +30,21 @@ from .state_space import StateSpace
 from .validity import find_linear_risks
 
 
-class Linear(StateSpace):
+class Linear(PublicMembers, StateSpace):
     """Linear model about an operating point: matrices, modes, responses; see `LinearEquations`."""
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Description": "model state frame coordinate_names coordinate_units input_names "
+        "disturbance_names state_names prescribed_coordinates "
+        "free_speed_indices position_states velocity_states",
+        "Matrices": "M C K V W A B B_disturbances output_matrices C_prescribed K_prescribed "
+        "has_stiffness",
+        "Contributions": "K_elastic K_springs K_geometric K_load C_damping C_gyroscopic",
+        "Analysis": "modes dynamic_stiffness_modes frequency_response expand "
+        "displaced_state to_fixed_frame symbolic",
+        "Verdict": "trusted verdict risks warnings",
+        "Output": "plot save to_dict to_control",
+    }
 
     def modes(self, count: int | None = None, damped: bool | None = None) -> Modes:
         """Normal modes: all, or the `count` slowest.

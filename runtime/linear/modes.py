@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mstmm.array_validation import Array, finite_float
 from mstmm.errors import SceneError
+from mstmm.public_members import PublicMembers
 from mstmm.risk import AssessedResult, Risk, information
 from mstmm.safe_text import abbreviate_names
 
@@ -36,7 +37,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)
-class Modes(AssessedResult):
+class Modes(PublicMembers, AssessedResult):
     """k modes x(t) = Re(shape exp(eigenvalue t)) about an operating point, by ascending omega.
 
     Attributes:
@@ -47,6 +48,15 @@ class Modes(AssessedResult):
         is_complete: whether no mode below the last one is missing; None if not counted.
         count: requested number of modes; None for all.
     """
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Modes": "eigenvalues omega frequency damping_ratio shapes whirl unstable "
+        "is_undamped is_complete count frame linear lowest",
+        "Participation": "dominant_coordinates kinetic_energy_shares strain_energy_shares "
+        "participation_factors effective_modal_mass displaced_state",
+        "Verdict": "trusted verdict risks warnings",
+        "Output": "plot plot_eigenvalues view save to_xarray to_dict",
+    }
 
     linear: LinearEquations = field(repr=False)
     eigenvalues: Complex

@@ -6,12 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from copy import copy as shallow
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Never, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Never, Self
 
 import numpy as np
 
 from mstmm.array_validation import Array, finite_float, mapping_by_name
 from mstmm.errors import NumericalFailure, SceneError
+from mstmm.public_members import PublicMembers
 from mstmm.risk import Risk, sentences
 from mstmm.scene.validators.validation_messages import did_you_mean
 
@@ -43,7 +44,7 @@ _LOOKAHEAD_TICKS = 64.0
 _CHECKED_STEPS = 1000
 
 
-class Session:
+class Session(PublicMembers):
     """A run that the caller advances; created by `Model.session`.
 
     `advance` integrates over a tick with given inputs, which stay constant until changed.  With
@@ -56,6 +57,12 @@ class Session:
         model: the model at the start of the session.
         settings: method and steps.
     """
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "State": "t q u state model settings",
+        "Advance": "advance inputs stop_reason copy",
+        "Results": "outputs result risks warnings",
+    }
 
     def __init__(
         self,

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from mstmm.argument_validation import require_path
 from mstmm.notebook_html import NotebookDisplay, table
+from mstmm.public_members import PublicMembers
 
 from .certificate import Certificate
 from .result_record import Record
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from .scene3d.view import SceneView
 
 
-class Result(Record, NotebookDisplay):
+class Result(PublicMembers, Record, NotebookDisplay):
     """Result of a run: states and derived quantities at the sample times.
 
     Arrays have the time as their first axis, SI units, radians; vectors are in inertial axes.
@@ -38,6 +39,23 @@ class Result(Record, NotebookDisplay):
         meshes: contents of the mesh files of shapes by their paths, of a loaded result.
         checkpoint: the file that stores the run until its result is saved; None without one.
     """
+
+    member_groups: ClassVar[Mapping[str, str]] = {
+        "Run": "model settings success status message statistics method_history "
+        "achieved_error last_state checkpoint",
+        "Samples": "t q u udot event coordinates speeds coordinate_info",
+        "Motion": "position velocity acceleration orientation angular_velocity "
+        "angular_acceleration center_of_mass",
+        "Loads": "force moment effort",
+        "Energy and momentum": "energy energy_components work power momentum angular_momentum "
+        "body_momentum body_angular_momentum",
+        "Flexible bodies": "deflection slope curvature deflected_shape bending_moment axial_force "
+        "section_force section_moment strain_energy modal_energy "
+        "equivalent_velocity equivalent_angular_velocity",
+        "Quantities by name": "quantity quantity_names default_quantities picture_names outputs table",
+        "Verdict": "trusted certificate risks warnings",
+        "Output": "plot view report save to_xarray meshes",
+    }
 
     @property
     def trusted(self) -> bool:

@@ -153,7 +153,7 @@ def first_run(
         settings, segments = replace(settings, method=settings.first_method), ()
     result = trajectory(system, run, settings, status, message, earlier)
     if watch.earlier_seconds:
-        result = replace(result, start_findings=watch.earlier_seconds)
+        result = replace(result, earlier_seconds=watch.earlier_seconds)
     if segments:
         result = replace(result, methods=segments)
     if status is not None and not result.is_comparable:

@@ -46,7 +46,9 @@ class Trajectory:
     methods: tuple[MethodSegment, ...] = ()  # of method "auto"
     achieved_error: AchievedError | None = None  # of a run with a target error
     reported_risks: bool = True  # whether its risks appear among its warnings
-    start_findings: float = 0.0  # wall time in s of earlier processes; result files do not store it
+    earlier_seconds: float = (
+        0.0  # wall time in s of earlier processes; result files do not store it
+    )
 
     @property
     def first(self) -> tuple[float, Array, Array]:

@@ -163,7 +163,9 @@ def _run(model: Model, method: str) -> Outcome:
     step = STEP if method in FIXED else None
     with ImpatientSignal(PATIENCE) as ctrl_c:
         try:
-            result = model.simulate(T_END, method, step, max_steps=most, certify=method == FIRST)
+            result = model.simulate(
+                T_END, mstmm.methods.Method(method, max_steps=most), step, certify=method == FIRST
+            )
         except KeyboardInterrupt:
             return Outcome(INTERRUPTED)
     if ctrl_c.came or result.status is None:

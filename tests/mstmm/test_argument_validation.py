@@ -52,17 +52,63 @@ WORDS: dict[str, tuple[Callable[[Any, Any], Any], str]] = {
         lambda r, x: mstmm.compile(r.model.scene, flexibility=x), "one of coupled, one-way, rigid",
     ),
     "method": (lambda r, x: r.model.simulate(0.1, x), "expected a name such as dop853"),
-    "scheme": (lambda r, x: r.model.simulate(0.1, scheme=x), "expected a name such as hht"),
-    "tangent": (lambda r, x: r.model.simulate(0.1, tangent=x), "expected one of auto, exact, laws"),
-    "max_step": (lambda r, x: r.model.simulate(0.1, max_step=x), "expected a time above zero"),
-    "on_risk": (lambda r, x: r.model.simulate(0.1, on_risk=x), "expected one of warn, refuse"),
-    "error_of": (lambda r, x: r.model.simulate(0.1, error_of=x), "expected a list of names"),
-    "resume": (lambda r, x: r.model.simulate(0.1, resume=x), "expected True or False"),
+    "scheme": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.ClassicalDiscreteTime(scheme=x)),
+        "scheme = .*: expected a name such as hht",
+    ),
+    "iterations": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.ClassicalDiscreteTime(iterations=x)),
+        "iterations = .*: expected a whole number of iterations",
+    ),
+    "radius": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.GeneralizedAlpha(radius=x)),
+        "radius = .*: expected a spectral radius from 0 to 1",
+    ),
+    "name of a method": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.Method(x)),
+        "expected a name such as dop853",
+    ),
+    "tangent": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.Implicit(tangent=x)),
+        "expected one of auto, exact, laws",
+    ),
+    "max_step": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.Method(max_step=x)),
+        "max_step = .*: expected a time above zero",
+    ),
+    "max_steps": (
+        lambda r, x: r.model.simulate(0.1, mstmm.methods.Method(max_steps=x)),
+        "max_steps = .*: expected a whole number of steps",
+    ),
+    "error": (
+        lambda r, x: r.model.simulate(0.1, error=mstmm.ErrorRequest(x)), "an error above zero"
+    ),
+    "of a target error": (
+        lambda r, x: r.model.simulate(0.1, error=mstmm.ErrorRequest(1e-3, of=x)),
+        "of = .*: expected a list of names",
+    ),
+    "execution": (lambda r, x: r.model.simulate(0.1, execution=x), "execution = .*: expected"),
+    "on_risk": (
+        lambda r, x: r.model.simulate(0.1, execution=mstmm.Execution(on_risk=x)),
+        "expected one of warn, refuse",
+    ),
+    "progress": (
+        lambda r, x: r.model.simulate(0.1, execution=mstmm.Execution(progress=x)),
+        "progress = .*: expected",
+    ),
+    "resume": (
+        lambda r, x: r.model.simulate(0.1, execution=mstmm.Execution(resume=x)),
+        "expected True or False",
+    ),
     "checkpoint": (
-        lambda r, x: r.model.simulate(0.1, checkpoint=x), "expected the name of a file"
+        lambda r, x: r.model.simulate(0.1, execution=mstmm.Execution(checkpoint=x)),
+        "expected the name of a file",
     ),
     "method of a session": (lambda r, x: r.model.session(method=x), "expected a name such as"),
-    "tangent of a session": (lambda r, x: r.model.session(tangent=x), "expected one of auto"),
+    "tangent of a session": (
+        lambda r, x: r.model.session(method=mstmm.methods.Implicit(tangent=x)),
+        "expected one of auto",
+    ),
     "damped": (lambda r, x: r.model.modes(damped=x), "expected True, False or None"),
     "parameters": (
         lambda r, x: r.model.derivatives([0.1], [0.0], parameters=x), "expected a list of names"

@@ -133,9 +133,6 @@ SETTINGS: dict[str, tuple[dict[str, Any], str]] = {
     "no atol": ({"atol": np.nan}, "atol = nan"),
     "atol zero": ({"atol": 0}, "atol = 0: expected an absolute tolerance above zero"),
     "several atol": ({"atol": [1e-9, 1e-6]}, "atol = [1e-09, 1e-06]"),
-    "no max_step": ({"max_step": np.nan}, "max_step = nan"),
-    "negative max_step": ({"max_step": -0.1}, "max_step = -0.1"),
-    "half a step": ({"max_steps": 1.5}, "max_steps = 1.5: expected a whole number"),
     "no start": ({"t_start": np.nan}, "t_start = nan"),
     "an end before the start": ({"t_start": 2.0}, "t_end = 1: expected a time in s, not before"),
     "a method that is no name": ({"method": ["dop853"]}, "method = ['dop853']"),
@@ -150,6 +147,22 @@ def test_settings_are_refused_by_name_for_every_integrator(
     changes, message = SETTINGS[case]
     with pytest.raises(mstmm.SceneError, match=re.escape(message)):
         model.simulate(1.0, **({"method": method} | changes))
+
+
+@pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"max_step": np.nan}, "max_step = nan"),
+        ({"max_step": -0.1}, "max_step = -0.1"),
+        ({"max_steps": 1.5}, "max_steps = 1.5: expected a whole number"),
+    ],
+)
+def test_options_of_methods_are_refused_by_name_for_every_integrator(
+    model: mstmm.Model, method: str, options: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(mstmm.SceneError, match=re.escape(message)):
+        model.simulate(1.0, mstmm.methods.Method(method, **options))
 
 
 @pytest.mark.parametrize("method", ["dop853", "scipy-RK45"])
@@ -173,8 +186,13 @@ def test_a_batch_of_none(model: mstmm.Model) -> None:
 
 
 def test_numbers_of_other_libraries_are_numbers(model: Any) -> None:
-    run = model.simulate(np.float32(0.5), rtol=np.float64(1e-6), max_steps=np.int64(1000),
-                         output_times=np.array([0, 0.5], np.float32), max_step=np.inf)  # fmt: skip
+    limits: dict[str, Any] = {"max_steps": np.int64(1000), "max_step": np.inf}
+    run = model.simulate(
+        np.float32(0.5),
+        mstmm.methods.Method(**limits),
+        rtol=np.float64(1e-6),
+        output_times=np.array([0, 0.5], np.float32),
+    )
     assert run.success and list(run.t) == [0.0, 0.5]
 
 

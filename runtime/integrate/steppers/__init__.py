@@ -13,6 +13,7 @@ from importlib import import_module
 
 from mstmm.errors import SceneError
 
+from ..methods import IMPLICIT, METHODS_WITH_RADIUS, TANGENTS
 from .implicit_methods import with_position_constraints
 from .tableau import Tableau, from_monomials, hermite, to_read_only
 
@@ -40,26 +41,14 @@ __all__ = [
 ]
 
 EXPLICIT = ("rk4", "dopri5", "dop853", "pirk13")
-IMPLICIT = (
-    "rodas4", "rodas4p2", "rodas5p", "ros34pw2", "rodas4pw", "esdirk436", "kvaerno5",
-    "genalpha", "dttmm", "hht", "newmark", "wilson", "houbolt", "exprb32",
-    "genalpha-index3", "hht-index3",
-)  # fmt: skip
 BUILT_IN = EXPLICIT + IMPLICIT
 
 #: Explicit methods, as messages list them.
 EXPLICIT_METHODS = f"{', '.join(EXPLICIT[:-1])} or {EXPLICIT[-1]}"
 
-#: Methods whose spectral radius at infinity a run may choose.
-METHODS_WITH_RADIUS = ("genalpha", "dttmm", "genalpha-index3")
-
 #: Suffix of methods that satisfy the position constraints of closed loops at the end of a step;
 #: the others satisfy those of accelerations and project the state after each step.
 INDEX3_SUFFIX = "-index3"
-
-#: Tangents of the equations of motion for implicit methods, in the order of the C loop's numbers:
-#: auto is the exact one for Rosenbrock methods; iterations first try that of inertia and laws.
-TANGENTS = ("auto", "exact", "laws")
 
 #: Rosenbrock methods whose order does not depend on the tangent, and methods that iterate.
 W_METHODS = ("ros34pw2", "rodas4pw")

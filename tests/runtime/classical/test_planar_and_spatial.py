@@ -75,10 +75,10 @@ def test_plane_and_space_say_the_same(
     held: str, kind: str, taken: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = mstmm.compile(planar_scene(held, kind, 1))
-    plane = model.simulate(0.2, RICCATI, 0.005, iterations=20)
+    plane = model.simulate(0.2, mstmm.methods.ClassicalDiscreteTime(RICCATI, iterations=20), 0.005)
     assert taken == [True]
     in_space(monkeypatch)
-    space = model.simulate(0.2, RICCATI, 0.005, iterations=20)
+    space = model.simulate(0.2, mstmm.methods.ClassicalDiscreteTime(RICCATI, iterations=20), 0.005)
     assert plane.success and space.success
     assert plane.q == pytest.approx(space.q, abs=1e-8)
     assert plane.u == pytest.approx(space.u, abs=1e-6)

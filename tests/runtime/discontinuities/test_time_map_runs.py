@@ -108,7 +108,7 @@ def test_the_second_run_looks_elsewhere() -> None:
 
 
 def test_max_step_bounds_every_step() -> None:
-    result = pushed("0*t", 10.0, max_step=0.1)
+    result = pushed("0*t", 10.0, method=mstmm.methods.Method(max_step=0.1))
     assert np.diff(result.t).max() <= 0.1 * (1 + 1e-12)
 
 

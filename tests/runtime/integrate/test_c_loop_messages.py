@@ -10,6 +10,7 @@ import pytest
 import mstmm
 from mstmm.errors import SceneError
 from mstmm.runtime.integrate.c_loop import Failure, Status, failure_text
+from mstmm.runtime.integrate.methods import ClassicalDiscreteTime, GeneralizedAlpha, Implicit
 from mstmm.runtime.integrate.steppers import BUILT_IN, EXPLICIT, get
 from mstmm.runtime.model.model import Model
 
@@ -54,15 +55,21 @@ def test_a_method_of_fixed_steps_names_one_of_its_kind(method: str) -> None:
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
-    ({"tangent": "foo"}, 'tangent = "foo": expected'),
-    ({"method": "rodas4", "tangent": "laws"}, 'tangent = "laws": rodas4 has a low'),
-    ({"tangent": "exact"}, 'tangent = "exact": method "auto" has no tangent to choose'),
+    ({"method": Implicit(tangent="foo")}, 'tangent = "foo": expected'),
+    ({"method": Implicit("rodas4", tangent="laws")}, 'tangent = "laws": rodas4 has a low'),
+    (
+        {"method": Implicit("auto", tangent="exact")},
+        'tangent = "exact": method "auto" has no tangent to choose',
+    ),
     ({"method": "rodas6"}, 'method "rodas6" is not known'),
-    ({"method": "rodas4", "radius": 0.5}, 'method "rodas4" has no such parameter'),
+    ({"method": GeneralizedAlpha("rodas4", radius=0.5)}, 'method "rodas4" has no such parameter'),
     ({"method": "auto", "step": 0.1}, 'method "auto" chooses its steps'),
     ({"method": "scipy-RK45", "step": 0.1}, 'method "scipy-RK45" chooses its own steps'),
     ({"method": "dttmm-classical"}, 'method "dttmm-classical" takes fixed steps'),
-    ({"method": "dttmm-classical", "step": 0.1, "scheme": "foo"}, 'scheme "foo" does not exist'),
+    (
+        {"method": ClassicalDiscreteTime(scheme="foo"), "step": 0.1},
+        'scheme "foo" does not exist',
+    ),
 ]
 
 

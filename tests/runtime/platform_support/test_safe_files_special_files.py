@@ -30,7 +30,9 @@ def pipe(tmp_path: Path) -> Iterator[Path]:
 
 
 def resumed(path: Path) -> Any:
-    return mstmm.compile(pins(1, [0.3])).simulate(0.1, checkpoint=path, resume=True)
+    return mstmm.compile(pins(1, [0.3])).simulate(
+        0.1, execution=mstmm.Execution(checkpoint=path, resume=True)
+    )
 
 
 READERS: dict[str, Callable[[Path], Any]] = {

@@ -36,7 +36,7 @@ def test_a_pulse_that_was_passed_over(effort: str, passed: bool, times: Any) -> 
 
 
 def test_short_steps_see_it() -> None:
-    assert not told(PULSE, max_step=1e-3)
+    assert not told(PULSE, method=mstmm.methods.Method(max_step=1e-3))
     assert not told(PULSE, method="rk4", step=1e-3)
     assert told(PULSE, method="rk4", step=0.05)
     assert told(PULSE, method="rk4", step=0.05, output_times=[10.0])
@@ -90,7 +90,7 @@ def test_a_law_that_is_narrow_in_a_speed(options: dict[str, Any]) -> None:
     hinge = SLIDE | {"law": {"effort": "-100*exp(-((u-0.5)/1e-4)^2)+0.1"}}
     found, run = warned(hinge, options=options)
     assert (found and run.u[-1, 0] > 0.51) or options.get("step")
-    found, run = warned(hinge, options={"max_step": 1e-3})
+    found, run = warned(hinge, options={"method": mstmm.methods.Method(max_step=1e-3)})
     assert not found
     assert run.u[-1, 0] == pytest.approx(0.5 - 1e-4 * np.sqrt(np.log(1000)), abs=1e-8)
 

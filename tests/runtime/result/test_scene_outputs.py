@@ -107,7 +107,7 @@ def test_outputs_are_shown_where_nobody_chose() -> None:
 
 def test_the_error_of_an_output_can_be_asked_for() -> None:
     model = mstmm.compile(scene(HEIGHT), engine="looped")
-    loose = model.simulate(1.0, error=1e-4, error_of="height")
+    loose = model.simulate(1.0, error=mstmm.ErrorRequest(1e-4, of="height"))
     tight = model.simulate(1.0, rtol=1e-11, atol=1e-13, output_times=loose.t)
     assert loose.achieved_error is not None and "m of height" in str(loose.achieved_error)
     apart = loose.outputs()["height"] - tight.outputs()["height"]

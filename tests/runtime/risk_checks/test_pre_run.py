@@ -114,7 +114,7 @@ def test_the_end_of_the_run_and_the_start_count() -> None:
 def test_a_run_that_spins_a_linear_beam_is_refused() -> None:
     model = mstmm.compile(blade(False, drive=SPIN_UP), engine="looped")
     with pytest.raises(mstmm.RiskRefused, match='stiffening: "blade" has no geometric') as told:
-        model.simulate(10.0, on_risk="refuse")
+        model.simulate(10.0, execution=mstmm.Execution(on_risk="refuse"))
     assert told.value.result is None
 
 

@@ -79,14 +79,14 @@ def test_a_run_is_refused_before_it_is_made(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr("mstmm.runtime.model.run_results.first_run", made)
     with pytest.raises(mstmm.RiskRefused, match=r"before the run:\n  step-stability: step") as seen:
-        model.simulate(1.0, method="rk4", step=0.05, on_risk="refuse")
+        model.simulate(1.0, method="rk4", step=0.05, execution=mstmm.Execution(on_risk="refuse"))
     (risk,) = seen.value.risks
     assert (risk.name, risk.element, risk.seen_before_run) == (
         "step-stability",
         'hinge "motor"',
         True,
     )
-    assert risk.figure > risk.limit and "use a step below" in risk.remedy
+    assert risk.value > risk.limit and "use a step below" in risk.remedy
     assert seen.value.result is None
     assert isinstance(seen.value, mstmm.NumericalFailure)
 
@@ -96,7 +96,7 @@ def test_a_run_that_is_refused_behind_its_end_is_kept() -> None:
     told = model.simulate(5.0, **COARSE)
     assert [risk.name for risk in told.risks] == ["energy-drift"]
     with pytest.raises(mstmm.RiskRefused, match=r"in the result:\n  energy-drift: ") as seen:
-        model.simulate(5.0, **COARSE, on_risk="refuse")
+        model.simulate(5.0, **COARSE, execution=mstmm.Execution(on_risk="refuse"))
     kept = seen.value.result
     np.testing.assert_array_equal(kept.q, told.q)
     assert kept.risks == told.risks == seen.value.risks
@@ -104,13 +104,15 @@ def test_a_run_that_is_refused_behind_its_end_is_kept() -> None:
 
 def test_a_wanted_error_that_is_not_reached_is_refused() -> None:
     with pytest.raises(mstmm.RiskRefused, match="wanted-error") as seen:
-        mstmm.compile(pins(3, [1.0, 2.0, -1.0])).simulate(60.0, error=1e-9, on_risk="refuse")
-    assert seen.value.result.error_estimate is not None
+        mstmm.compile(pins(3, [1.0, 2.0, -1.0])).simulate(
+            60.0, error=1e-9, execution=mstmm.Execution(on_risk="refuse")
+        )
+    assert seen.value.result.achieved_error is not None
 
 
 def test_what_is_only_worth_knowing_refuses_nothing() -> None:
     model = mstmm.compile(pins(1, [7.0]))
-    run = model.simulate(1.0, on_risk="refuse")
+    run = model.simulate(1.0, execution=mstmm.Execution(on_risk="refuse"))
     (risk,) = run.risks
     assert (risk.name, risk.element, risk.invalidates) == ("degrees", 'hinge "pin0"', False)
     assert run.warnings == (str(risk),)
@@ -122,13 +124,15 @@ def test_a_scene_that_speaks_against_itself_is_refused() -> None:
     wall = {"name": "wall", "type": "fixed", "inboard": "ground", "outboard": "b"}
     model = mstmm.compile(mstmm.Scene(gravity=(0, 0, 0), beam=[short], hinge=[wall]))
     with pytest.raises(mstmm.RiskRefused, match="short-beam"):
-        model.simulate(0.1, on_risk="refuse")
+        model.simulate(0.1, execution=mstmm.Execution(on_risk="refuse"))
     assert "short-beam" in {risk.name for risk in model.simulate(0.1).risks}
 
 
 def test_ignored_risks_are_not_told_and_do_not_make_a_run_trusted(tmp_path: Path) -> None:
     pytest.importorskip("h5netcdf")
-    run = swinging().simulate(5.0, **COARSE, certify=True, on_risk="ignore")
+    run = swinging().simulate(
+        5.0, **COARSE, certify=True, execution=mstmm.Execution(on_risk="ignore")
+    )
     assert run.warnings == ()
     assert [risk.name for risk in run.risks] == ["energy-drift"]
     assert not run.trusted
@@ -137,17 +141,19 @@ def test_ignored_risks_are_not_told_and_do_not_make_a_run_trusted(tmp_path: Path
 
 
 def test_a_failed_run_comes_back_whatever_its_risks() -> None:
-    run = mstmm.compile(motor("exp(u[0])^3", speed=1.0)).simulate(1.0, on_risk="refuse")
+    run = mstmm.compile(motor("exp(u[0])^3", speed=1.0)).simulate(
+        1.0, execution=mstmm.Execution(on_risk="refuse")
+    )
     assert not run.success
 
 
 def test_another_word_is_named() -> None:
     with pytest.raises(mstmm.SceneError, match="on_risk = 'stop': expected one of warn, refuse"):
-        swinging().simulate(1.0, on_risk="stop")
+        swinging().simulate(1.0, execution=mstmm.Execution(on_risk="stop"))
 
 
 def test_a_clean_run_has_none() -> None:
-    run = swinging().simulate(2.0, on_risk="refuse")
+    run = swinging().simulate(2.0, execution=mstmm.Execution(on_risk="refuse"))
     assert run.risks == () and run.warnings == ()
 
 
@@ -172,7 +178,7 @@ def test_a_look_that_is_interrupted_loses_nothing(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(mstmm.Result, "risks", property(interrupted))
     with pytest.raises(mstmm.RiskRefused, match="interrupted") as refused:
-        swinging().simulate(0.5, on_risk="refuse")
+        swinging().simulate(0.5, execution=mstmm.Execution(on_risk="refuse"))
     assert refused.value.result.success and refused.value.result.t[-1] == 0.5
 
 

@@ -54,7 +54,9 @@ def test_a_vibration_that_steps_must_follow_is_let_be(method: str, engine: str) 
 
 
 def test_before_a_run_the_start_is_looked_at() -> None:
-    (risk,) = advised(motor("0", damping=1e3), 100.0, method="dop853", max_steps=100)
+    (risk,) = advised(
+        motor("0", damping=1e3), 100.0, method=mstmm.methods.Method("dop853", max_steps=100)
+    )
     assert (
         risk.seen_before_run
         and "which limits dop853 to about 5e+04 steps in 100 s" in risk.description

@@ -28,10 +28,12 @@ import numpy as np
 import mstmm
 scene, out, mode, t_end = sys.argv[1:]
 model = mstmm.compile(mstmm.load_scene(scene))
-more = {} if mode == "full" else {"checkpoint": out + ".ck.npz", "resume": mode == "resume"}
-if mode == "cut":
-    more["progress"] = lambda t, end: (print(t, flush=True), sys.stdin.readline())
-run = model.simulate(float(t_end), rtol=1e-11, atol=1e-13, **more)
+pause = lambda t, end: (print(t, flush=True), sys.stdin.readline())
+execution = mstmm.Execution(
+    progress=pause if mode == "cut" else None, resume=mode == "resume",
+    checkpoint=None if mode == "full" else out + ".ck.npz",
+)
+run = model.simulate(float(t_end), rtol=1e-11, atol=1e-13, execution=execution)
 print(run.message)
 arrays = {n: getattr(run, n) for n in ("t", "q", "u", "work", "event")}
 np.savez(out, memory=run.trajectory.memory, energy=run.energy(), **arrays)
@@ -124,24 +126,32 @@ def test_a_checkpoint_of_another_run_is_refused(
     path, model = tmp_path / "run.npz", mstmm.compile(pins(2, [0.3, 0.4]))
     with monkeypatch.context() as patch:
         interrupted(patch, 1.0)
-        run = model.simulate(5.0, checkpoint=path, step=0.01, method="rk4")
+        run = model.simulate(
+            5.0, execution=mstmm.Execution(checkpoint=path), step=0.01, method="rk4"
+        )
     assert run.status is None and not run.success and 1.0 < run.t[-1] < 1.1
     assert run.last_state[0] == run.t[-1] and path.exists()
     other = mstmm.compile(pins(2, [0.3, 0.5]))
     with pytest.raises(mstmm.SceneError, match=r"run\.npz.*the scene has changed"):
-        other.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
+        other.simulate(
+            5.0, execution=mstmm.Execution(checkpoint=path, resume=True), step=0.01, method="rk4"
+        )
     for change in ({"step": 0.02}, {"t_end": 6.0}, {"method": "dop853", "step": None}):
         settings = {"t_end": 5.0, "step": 0.01, "method": "rk4"} | change
         with pytest.raises(mstmm.SceneError, match="settings or the initial state have changed"):
-            model.simulate(checkpoint=path, resume=True, **settings)  # type: ignore[arg-type]
+            model.simulate(execution=mstmm.Execution(checkpoint=path, resume=True), **settings)  # type: ignore[arg-type]
     with np.load(path) as file:
         assert all(file[name].dtype.kind in "fiU" for name in file.files)  # no pickle
     whole = model.simulate(5.0, step=0.01, method="rk4")
-    again = model.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
+    again = model.simulate(
+        5.0, execution=mstmm.Execution(checkpoint=path, resume=True), step=0.01, method="rk4"
+    )
     assert again.q.tobytes() == whole.q.tobytes() and again.statistics == whole.statistics
     again.save(tmp_path / "run.csv")
     assert [file.name for file in tmp_path.iterdir()] == ["run.csv"]
-    once_more = model.simulate(0.1, checkpoint=path, resume=True)  # nothing there: from the start
+    once_more = model.simulate(
+        0.1, execution=mstmm.Execution(checkpoint=path, resume=True)
+    )  # nothing there: from the start
     assert once_more.success and once_more.t[0] == 0.0
 
 
@@ -150,10 +160,14 @@ def test_a_file_that_is_no_checkpoint(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "run.npz"
     path.write_bytes(content)
     with pytest.raises(mstmm.SceneError, match=r"run\.npz"):
-        mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
+        mstmm.compile(pins(1, [0.3])).simulate(
+            1.0, execution=mstmm.Execution(checkpoint=path, resume=True)
+        )
     np.savez(path, x=1)
     with pytest.raises(mstmm.SceneError, match="not written by this version"):
-        mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, resume=True)
+        mstmm.compile(pins(1, [0.3])).simulate(
+            1.0, execution=mstmm.Execution(checkpoint=path, resume=True)
+        )
 
 
 EDITS: dict[str, Callable[[Any], Any]] = {
@@ -172,7 +186,7 @@ EDITS: dict[str, Callable[[Any], Any]] = {
 @pytest.mark.parametrize("name", [*EDITS, "missing"])
 def test_a_checkpoint_that_was_edited(tmp_path: Path, name: str) -> None:
     model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
-    model.simulate(1.0, checkpoint=path)
+    model.simulate(1.0, execution=mstmm.Execution(checkpoint=path))
     with np.load(path) as file:
         data = {key: file[key] for key in file.files}
     if name == "missing":
@@ -181,7 +195,7 @@ def test_a_checkpoint_that_was_edited(tmp_path: Path, name: str) -> None:
         data[name] = EDITS[name](data[name])
     np.savez(path, **data)
     with pytest.raises(mstmm.SceneError, match=r"damaged|another scene, method or version"):
-        model.simulate(1.0, checkpoint=path, resume=True)
+        model.simulate(1.0, execution=mstmm.Execution(checkpoint=path, resume=True))
 
 
 def spend(path: Path, seconds: float) -> None:
@@ -198,30 +212,39 @@ def test_the_time_of_all_pieces_is_kept(
     for at in (1.0, 2.0):
         with monkeypatch.context() as patch:
             interrupted(patch, at)
-            run = model.simulate(5.0, checkpoint=path, resume=at > 1, step=0.01, method="rk4")
+            run = model.simulate(
+                5.0,
+                execution=mstmm.Execution(checkpoint=path, resume=at > 1),
+                step=0.01,
+                method="rk4",
+            )
         with np.load(path) as file:
             assert file["seconds"] > (5000.0 if at > 1 else 0.0)
-        assert run.trajectory.start_findings == (5000.0 if at > 1 else 0.0)
+        assert run.trajectory.earlier_seconds == (5000.0 if at > 1 else 0.0)
         spend(path, 5000.0)
-    run = model.simulate(5.0, checkpoint=path, resume=True, step=0.01, method="rk4")
-    assert run.success and run.trajectory.start_findings == 5000.0
+    run = model.simulate(
+        5.0, execution=mstmm.Execution(checkpoint=path, resume=True), step=0.01, method="rk4"
+    )
+    assert run.success and run.trajectory.earlier_seconds == 5000.0
 
 
 @pytest.mark.parametrize("share", [0.05, 0.5, 0.97])
 def test_a_checkpoint_that_was_cut_or_overwritten(tmp_path: Path, share: float) -> None:
     model, path = mstmm.compile(pins(1, [0.3])), tmp_path / "run.npz"
-    model.simulate(1.0, checkpoint=path)
+    model.simulate(1.0, execution=mstmm.Execution(checkpoint=path))
     whole = path.read_bytes()
     place = int(share * len(whole))
     for content in (whole[:place], whole[:place] + b"\0" * 40 + whole[place + 40 :]):
         path.write_bytes(content)
         with pytest.raises(mstmm.SceneError, match=r"run\.npz"):
-            model.simulate(1.0, checkpoint=path, resume=True)
+            model.simulate(1.0, execution=mstmm.Execution(checkpoint=path, resume=True))
 
 
 def test_a_folder_that_is_not_there_is_noticed_before_the_run(tmp_path: Path) -> None:
     with pytest.raises(mstmm.EnvironmentFailure, match="folder does not exist or is not writable"):
-        mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=tmp_path / "no" / "run.npz")
+        mstmm.compile(pins(1, [0.3])).simulate(
+            1.0, execution=mstmm.Execution(checkpoint=tmp_path / "no" / "run.npz")
+        )
 
 
 def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
@@ -235,7 +258,7 @@ def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(Path, "replace", full)
-    run = model.simulate(1.0, checkpoint=tmp_path / "run.npz")
+    run = model.simulate(1.0, execution=mstmm.Execution(checkpoint=tmp_path / "run.npz"))
     assert run.success and run.t[-1] == 1.0
     (note,) = (text for text in run.warnings if "no checkpoint" in text)
     assert "No space left on device" in note
@@ -254,7 +277,11 @@ def test_checkpoints_are_written_on_the_way(
             with np.load(path) as file:
                 seen.append(len(file["t"]))
 
-    assert mstmm.compile(pins(1, [0.3])).simulate(1.0, checkpoint=path, progress=progress).success
+    assert (
+        mstmm.compile(pins(1, [0.3]))
+        .simulate(1.0, execution=mstmm.Execution(checkpoint=path, progress=progress))
+        .success
+    )
     assert len(seen) > 3 and seen == sorted(set(seen))
 
 
@@ -268,7 +295,7 @@ def test_a_run_that_has_ended_is_kept_until_its_result_is_saved(
         low: Any = [{"name": "low", "when": "pin0.q < -0.5", "do": "stop"}]
         scene = mstmm.Scene(gravity=scene.gravity, body=scene.body, hinge=scene.hinge, event=low)
     model, path = mstmm.compile(scene), tmp_path / "run.npz"
-    first = model.simulate(5.0, checkpoint=path)
+    first = model.simulate(5.0, execution=mstmm.Execution(checkpoint=path))
     assert first.status is not None and first.t[-1] < 5.0
     assert path.exists() and first.success is (end == "event")
 
@@ -277,7 +304,7 @@ def test_a_run_that_has_ended_is_kept_until_its_result_is_saved(
 
     with monkeypatch.context() as patch:
         patch.setattr(Integrator, "advance", never)
-        again = model.simulate(5.0, checkpoint=path, resume=True)
+        again = model.simulate(5.0, execution=mstmm.Execution(checkpoint=path, resume=True))
     assert (again.message, again.status) == (first.message, first.status)
     assert again.q.tobytes() == first.q.tobytes() and again.statistics == first.statistics
     again.save(tmp_path / "run.csv")
@@ -292,7 +319,9 @@ def test_progress_grows_to_the_end(monkeypatch: pytest.MonkeyPatch, certify: boo
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     told = list[tuple[float, float]]()
     model = mstmm.compile(pins(1, [0.3]))
-    run = model.simulate(2.0, progress=lambda *x: told.append(x), certify=certify)
+    run = model.simulate(
+        2.0, execution=mstmm.Execution(progress=lambda *x: told.append(x)), certify=certify
+    )
     times = [t for t, _ in told]
     assert run.success and {end for _, end in told} == {2.0}
     assert times == sorted(times) and times[-1] > 1.7 and times[0] < 0.5
@@ -315,7 +344,7 @@ def test_an_exception_of_a_progress_callback_ends_the_run(
         raise CallerError("enough")
 
     with pytest.raises(CallerError, match="enough"):
-        model.simulate(1.0, method, step, progress=progress)
+        model.simulate(1.0, method, step, execution=mstmm.Execution(progress=progress))
     assert len(calls) == 1
     assert model.simulate(1.0, method, step).success  # and leaves the model as it was
 
@@ -331,7 +360,9 @@ def test_an_exception_of_a_progress_callback_ends_several_runs(
             raise CallerError("enough")
 
     with pytest.raises(CallerError, match="enough"):
-        mstmm.compile(pins(1, [0.3])).simulate(1.0, progress=progress, **asked)
+        mstmm.compile(pins(1, [0.3])).simulate(
+            1.0, execution=mstmm.Execution(progress=progress), **asked
+        )
 
 
 def test_a_run_goes_on_from_where_a_progress_callback_ended_it(
@@ -345,9 +376,14 @@ def test_a_run_goes_on_from_where_a_progress_callback_ended_it(
             raise CallerError("enough")
 
     with pytest.raises(CallerError):
-        model.simulate(1.0, checkpoint=path, progress=progress)
+        model.simulate(1.0, execution=mstmm.Execution(checkpoint=path, progress=progress))
     first = list[float]()
-    run = model.simulate(1.0, checkpoint=path, resume=True, progress=lambda t, end: first.append(t))
+    run = model.simulate(
+        1.0,
+        execution=mstmm.Execution(
+            checkpoint=path, resume=True, progress=lambda t, end: first.append(t)
+        ),
+    )
     whole = model.simulate(1.0)
     assert first[0] > 0.5
     np.testing.assert_array_equal(run.t, whole.t)

@@ -61,7 +61,9 @@ def test_the_work_of_dampers_closes_the_energy() -> None:
 
 
 def test_a_result_is_saved_loaded_and_certified(tmp_path: Path) -> None:
-    run = mstmm.compile(rods(2)).simulate(0.5, RICCATI, 0.005, scheme="hht:0.1", certify=True)
+    run = mstmm.compile(rods(2)).simulate(
+        0.5, mstmm.methods.ClassicalDiscreteTime(RICCATI, scheme="hht:0.1"), 0.005, certify=True
+    )
     error = run.certificate.error
     assert error is not None and 1e-5 < error.largest()["rad"] < 1e-2
     run.save(tmp_path / "run.nc")
@@ -71,7 +73,9 @@ def test_a_result_is_saved_loaded_and_certified(tmp_path: Path) -> None:
 
 
 def test_steps_are_counted_and_limited() -> None:
-    run = mstmm.compile(rods(2)).simulate(1.0, RICCATI, 0.01, max_steps=7, iterations=20)
+    run = mstmm.compile(rods(2)).simulate(
+        1.0, mstmm.methods.ClassicalDiscreteTime(RICCATI, max_steps=7, iterations=20), 0.01
+    )
     assert run.status is Status.TOO_MANY_STEPS
     assert len(run.t) == 8
     assert run.statistics is not None and run.statistics.evaluations >= 14
@@ -82,7 +86,9 @@ def test_ctrl_c_keeps_what_was_computed(heard: None) -> None:
         if t > 1.0:
             signal.raise_signal(signal.SIGINT)
 
-    run = mstmm.compile(rods(2)).simulate(1e4, RICCATI, 0.001, progress=interrupt)
+    run = mstmm.compile(rods(2)).simulate(
+        1e4, RICCATI, 0.001, execution=mstmm.Execution(progress=interrupt)
+    )
     assert run.status is None and "interrupted at t = " in run.message
     assert 1.0 < run.t[-1] < 1e4
 
@@ -90,9 +96,11 @@ def test_ctrl_c_keeps_what_was_computed(heard: None) -> None:
 def test_options_are_for_this_method_alone() -> None:
     model = mstmm.compile(rods(1))
     with pytest.raises(SceneError, match="takes neither scheme nor iterations"):
-        model.simulate(0.1, scheme="hht")
+        model.simulate(0.1, mstmm.methods.ClassicalDiscreteTime("dop853", scheme="hht"))
     with pytest.raises(SceneError, match="takes neither scheme nor iterations"):
-        model.simulate(0.1, iterations=2)
+        model.simulate(0.1, mstmm.methods.ClassicalDiscreteTime("dop853", iterations=2))
+    with pytest.raises(SceneError, match=r'scheme: method "dop853" .*ClassicalDiscreteTime'):
+        mstmm.methods.method("dop853", scheme="hht")
 
 
 def test_a_batch_is_refused() -> None:
@@ -117,19 +125,26 @@ def test_nothing_to_do_is_the_start_alone() -> None:
 
 
 @pytest.mark.parametrize(
-    "keys, said",
+    "options, said",
     [
-        ({}, "takes fixed steps: give step"),
-        ({"step": 0.01, "scheme": "euler"}, "use one of generalised-alpha, hht, newmark, wilson"),
-        ({"step": 0.01, "scheme": "hht:x"}, "expected alpha from 0 to 0.333333"),
-        ({"step": 0.01, "scheme": "newmark:0.4"}, "expected gamma from 0.5 to 1"),
-        ({"step": 0.01, "iterations": 0}, "a whole number of iterations, 1 or more"),
-        ({"step": 0.01, "checkpoint": "x"}, "writes no checkpoints"),
+        ({"scheme": "euler"}, "use one of generalised-alpha, hht, newmark, wilson"),
+        ({"scheme": "hht:x"}, "expected alpha from 0 to 0.333333"),
+        ({"scheme": "newmark:0.4"}, "expected gamma from 0.5 to 1"),
+        ({"iterations": 0}, "a whole number of iterations, 1 or more"),
     ],
 )
-def test_settings_that_make_no_sense_are_refused(keys: dict[str, Any], said: str) -> None:
+def test_options_that_make_no_sense_are_refused(options: dict[str, Any], said: str) -> None:
+    method = mstmm.methods.ClassicalDiscreteTime(RICCATI, **options)
     with pytest.raises(SceneError, match=said):
-        mstmm.compile(rods(1)).simulate(0.1, RICCATI, **keys)
+        mstmm.compile(rods(1)).simulate(0.1, method, 0.01)
+
+
+def test_settings_that_make_no_sense_are_refused() -> None:
+    model = mstmm.compile(rods(1))
+    with pytest.raises(SceneError, match="takes fixed steps: give step"):
+        model.simulate(0.1, RICCATI)
+    with pytest.raises(SceneError, match="writes no checkpoints"):
+        model.simulate(0.1, RICCATI, 0.01, execution=mstmm.Execution(checkpoint="x"))
 
 
 _PIN = {"name": "h", "type": "pin", "inboard": "ground", "outboard": "b", "axis": [0, 0, 1]}

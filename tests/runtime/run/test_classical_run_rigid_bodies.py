@@ -35,7 +35,10 @@ def exact_angles() -> Array:
 
 def angle_error(step: float, scheme: str, iterations: int, method: str = RICCATI) -> float:
     run = double_pendulum().simulate(
-        1.0, method, step, output_times=[1.0], scheme=scheme, iterations=iterations
+        1.0,
+        mstmm.methods.ClassicalDiscreteTime(method, scheme=scheme, iterations=iterations),
+        step,
+        output_times=[1.0],
     )
     return float(np.abs(np.cumsum(run.q[-1]) - exact_angles()).max())
 
@@ -74,7 +77,11 @@ def test_undamped_newmark_fails_on_hinges_at_position_level(
     step: float, before: float, iterations: int
 ) -> None:
     """Cardona, Geradin 1989: weakly unstable, converged or not; it ends with a message."""
-    run = double_pendulum().simulate(20, RICCATI, step, scheme="newmark", iterations=iterations)
+    run = double_pendulum().simulate(
+        20,
+        mstmm.methods.ClassicalDiscreteTime(RICCATI, scheme="newmark", iterations=iterations),
+        step,
+    )
     assert not run.success
     assert 4.0 < run.t[-1] < before
     assert "position gap" in run.message or "do not converge" in run.message
@@ -86,7 +93,9 @@ def test_undamped_newmark_fails_on_hinges_at_position_level(
     [("wilson", 1.0), ("hht", 0.46), ("hht:0.3", 0.54), ("generalised-alpha", 0.37)],
 )
 def test_damped_schemes_keep_the_energy_of_twenty_seconds(scheme: str, joules: float) -> None:
-    run = double_pendulum().simulate(20, RICCATI, 0.01, scheme=scheme)
+    run = double_pendulum().simulate(
+        20, mstmm.methods.ClassicalDiscreteTime(RICCATI, scheme=scheme), 0.01
+    )
     assert run.success
     assert np.abs(run.energy() - run.energy()[0]).max() == pytest.approx(joules, abs=0.03)
 
@@ -104,7 +113,11 @@ def spatial_tip(run: Result) -> Array:
 
 
 def spatial_run(step: float, scheme: str = "", iterations: int = 1, t_end: float = 1.0) -> Result:
-    return spinning().simulate(t_end, RICCATI, step, scheme=scheme, iterations=iterations)
+    return spinning().simulate(
+        t_end,
+        mstmm.methods.ClassicalDiscreteTime(RICCATI, scheme=scheme, iterations=iterations),
+        step,
+    )
 
 
 @pytest.mark.parametrize("scheme, alphas", [("generalised-alpha", (1 / 3, 4 / 9)),
@@ -210,7 +223,9 @@ def test_one_iteration_fails_beside_an_unresolved_vibration(scheme: str) -> None
     model = bushing(1e8)
     q, u = model.initial_state()
     q[0] = 1e-3
-    run = model.simulate(2.0, RICCATI, 0.01, scheme=scheme, initial=(q, u))
+    run = model.simulate(
+        2.0, mstmm.methods.ClassicalDiscreteTime(RICCATI, scheme=scheme), 0.01, initial=(q, u)
+    )
     assert not run.success
     assert "by more than the size of the scene" in run.message
 
@@ -219,7 +234,9 @@ def test_converged_steps_swing_and_damp_what_they_do_not_resolve() -> None:
     model = bushing(1e8)
     q, u = model.initial_state()
     q[0] = 1e-3
-    energy = model.simulate(2.0, RICCATI, 0.01, iterations=50, initial=(q, u)).energy()
+    energy = model.simulate(
+        2.0, mstmm.methods.ClassicalDiscreteTime(RICCATI, iterations=50), 0.01, initial=(q, u)
+    ).energy()
     change = energy - energy[0]
     assert np.abs(change).max() == pytest.approx(190, rel=0.03)
     assert change[-1] == pytest.approx(-48.6, abs=0.5)

@@ -87,19 +87,20 @@ def test_an_interrupted_run_on_compiled_code_continues_bit_for_bit(
     )  # else a fast machine has done before Ctrl-C
     settings: dict[str, Any] = {
         "t_end": 1000.0, "method": method, "rtol": 1e-8, "atol": 1e-10,
-        "output_times": [3.0, 400.0, 1000.0], "checkpoint": empty_cache / "run.npz",
+        "output_times": [3.0, 400.0, 1000.0],
     }  # fmt: skip
-    fused = model("fused")
-    whole = fused.simulate(**settings)
+    path, fused = empty_cache / "run.npz", model("fused")
+    whole = fused.simulate(execution=mstmm.Execution(checkpoint=path), **settings)
     calls = []
 
     def interrupt(t: float, _: float) -> None:
         calls.append(t)
         os.kill(os.getpid(), signal.SIGINT)
 
-    cut = fused.simulate(progress=interrupt, **settings)
+    cut = fused.simulate(execution=mstmm.Execution(checkpoint=path, progress=interrupt), **settings)
     assert calls
     assert cut.status is None
+    resumption = mstmm.Execution(checkpoint=path, resume=True)
     with pytest.raises(EnvironmentFailure, match="began on fused code, which cannot be compiled"):
-        model("looped").simulate(resume=True, **settings)
-    assert equal(fused.simulate(resume=True, **settings), whole)
+        model("looped").simulate(execution=resumption, **settings)
+    assert equal(fused.simulate(execution=resumption, **settings), whole)

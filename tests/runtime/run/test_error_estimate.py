@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SETTINGS: list[dict[str, Any]] = [
     {"method": "dop853", "rtol": 1e-6, "atol": 1e-9},
     {"method": "dop853", "rtol": 1e-9, "atol": 1e-12},
-    {"method": "dop853", "rtol": 1e-6, "atol": 1e-9, "max_step": 0.05},
+    {"method": mstmm.methods.Method("dop853", max_step=0.05), "rtol": 1e-6, "atol": 1e-9},
     {"method": "dopri5", "rtol": 1e-5, "atol": 1e-8},
     {"method": "dopri5", "rtol": 1e-9, "atol": 1e-12},
     {"method": "rk4", "step": 0.02},
@@ -170,13 +170,23 @@ def test_estimates_of_random_scenes(method: str, rng: np.random.Generator) -> No
         seed = int(rng.integers(10**6))
         data = random_scene(seed, most=4)
         model, start = mstmm.compile(mstmm.Scene.from_data(data)), random_state(data, seed)
-        run = model.simulate(0.3, method, rtol=1e-6, certify=True, initial=start, max_steps=2000)
+        run = model.simulate(
+            0.3,
+            mstmm.methods.Method(method, max_steps=2000),
+            rtol=1e-6,
+            certify=True,
+            initial=start,
+        )
         if not run.success:
             continue
         best = model.simulate(
-            0.3, rtol=1e-13, atol=1e-15, initial=start, output_times=np.unique(run.t),
-            max_steps=20_000,
-        )  # fmt: skip
+            0.3,
+            mstmm.methods.Method(max_steps=20_000),
+            rtol=1e-13,
+            atol=1e-15,
+            initial=start,
+            output_times=np.unique(run.t),
+        )
         if not best.success:
             continue
         true = compare(model.coordinate_layout, run.trajectory, best.trajectory, "")

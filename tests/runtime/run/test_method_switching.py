@@ -172,9 +172,9 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
     with monkeypatch.context() as patch:
         patch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
         patch.setattr(run_execution.RunMonitor, "look", look)
-        part = model.simulate(2.0, checkpoint=path, **options)
+        part = model.simulate(2.0, execution=mstmm.Execution(checkpoint=path), **options)
     assert part.status is None and (len(part.method_history) == 1) == (at == 0.001)
-    rest = model.simulate(2.0, checkpoint=path, resume=True, **options)
+    rest = model.simulate(2.0, execution=mstmm.Execution(checkpoint=path, resume=True), **options)
     assert equal(rest, whole) and rest.method_history == whole.method_history
     assert rest.statistics == whole.statistics
 
@@ -190,12 +190,12 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
 ])  # fmt: skip
 def test_an_edited_checkpoint_is_refused(tmp_path: Path, methods: str) -> None:
     model, path = compiled(pins(1, [0.3])), tmp_path / "run.npz"
-    model.simulate(1.0, method="auto", checkpoint=path)
+    model.simulate(1.0, method="auto", execution=mstmm.Execution(checkpoint=path))
     with np.load(path) as file:
         data = {key: file[key] for key in file.files}
     np.savez(path, **data | {"methods": np.array(methods)})
     with pytest.raises(mstmm.SceneError, match="damaged"):
-        model.simulate(1.0, method="auto", checkpoint=path, resume=True)
+        model.simulate(1.0, method="auto", execution=mstmm.Execution(checkpoint=path, resume=True))
 
 
 def test_where_implicit_steps_fail_the_run_goes_on_explicitly(
@@ -287,7 +287,7 @@ def test_what_makes_no_sense_with_it_is_refused() -> None:
     with pytest.raises(mstmm.SceneError, match="chooses its steps"):
         model.simulate_batch(state, t_end=1.0, method="auto", step=0.01)
     with pytest.raises(mstmm.SceneError, match='method "auto" has no such parameter'):
-        model.simulate(1.0, method="auto", radius=0.5)
+        model.simulate(1.0, method=mstmm.methods.GeneralizedAlpha("auto", radius=0.5))
     with pytest.raises(mstmm.SceneError, match="available are: auto, rk4"):
         model.simulate(1.0, method="automatic")
     with pytest.raises(ValueError, match="'auto' exists already"):
@@ -328,6 +328,6 @@ def test_a_run_without_a_method_is_resumed(tmp_path: Path) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        model.simulate(2.0, **LOOSE, progress=stop, checkpoint=path)
-    again = model.simulate(2.0, **LOOSE, checkpoint=path, resume=True)
+        model.simulate(2.0, **LOOSE, execution=mstmm.Execution(progress=stop, checkpoint=path))
+    again = model.simulate(2.0, **LOOSE, execution=mstmm.Execution(checkpoint=path, resume=True))
     assert equal(again, whole) and again.method_history == whole.method_history

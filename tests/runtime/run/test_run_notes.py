@@ -16,7 +16,7 @@ from tests.support.scenes.results import motor, pins, rod
 ESTIMATING = [method for method in IMPLICIT if get(method).adaptive]
 
 
-def swung(step: float, method: str, **more: Any) -> Result:
+def swung(step: float, method: str | mstmm.methods.Method, **more: Any) -> Result:
     """Two rods that swing from near the horizontal."""
     model = mstmm.compile(pins(2, [-0.3, 0.2]), engine="looped")
     return model.simulate(2.0, method, step, **more)
@@ -89,5 +89,5 @@ def test_what_rests_is_not_said_to_be_missed() -> None:
 
 def test_a_longest_step_beside_a_fixed_one_is_refused() -> None:
     with pytest.raises(mstmm.SceneError, match=r"max_step = 0\.1: .* step = 0\.01 fixes all steps"):
-        swung(0.01, "genalpha", max_step=0.1)
-    assert swung(0.01, "genalpha", max_step=np.inf).success
+        swung(0.01, mstmm.methods.Method("genalpha", max_step=0.1))
+    assert swung(0.01, mstmm.methods.Method("genalpha", max_step=np.inf)).success

@@ -68,7 +68,7 @@ def test_a_comparison_that_is_no_number_ends_one_trajectory_of_a_batch(engine: s
 
 
 def test_too_many_steps() -> None:
-    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, max_steps=7)
+    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, mstmm.methods.Method(max_steps=7))
     assert run.status is Status.TOO_MANY_STEPS and "more steps than allowed" in run.message
     assert run.statistics is not None and run.statistics.steps == 7 and len(run.t) == 8
     check_remains(run)
@@ -76,10 +76,10 @@ def test_too_many_steps() -> None:
 
 def test_output_times_do_not_hide_the_last_good_state() -> None:
     model = mstmm.compile(pins(2, [0.3, 0.4]))
-    run = model.simulate(5.0, max_steps=7, output_times=[0.0, 2.5, 5.0])
+    run = model.simulate(5.0, mstmm.methods.Method(max_steps=7), output_times=[0.0, 2.5, 5.0])
     t, q, u = run.last_state
     assert list(run.t) == [0.0] and 0 < t < 2.5
-    np.testing.assert_array_equal(q, model.simulate(5.0, max_steps=7).q[-1])
+    np.testing.assert_array_equal(q, model.simulate(5.0, mstmm.methods.Method(max_steps=7)).q[-1])
     assert u.shape == (2,)
 
 

@@ -151,9 +151,13 @@ def test_a_radius_out_of_range_is_refused(radius: float) -> None:
     model = mstmm.compile(standing(200.0), engine="looped")
     for method in ("genalpha", "dttmm", "newmark"):
         with pytest.raises(SceneError, match="radius"):
-            model.simulate(0.1, method, radius=radius)
+            model.simulate(0.1, mstmm.methods.GeneralizedAlpha(method, radius=radius))
         with pytest.raises(SceneError, match="radius"):
-            model.simulate_batch(model.initial_state(), t_end=0.1, method=method, radius=radius)
+            model.simulate_batch(
+                model.initial_state(),
+                t_end=0.1,
+                method=mstmm.methods.GeneralizedAlpha(method, radius=radius),
+            )
 
 
 @pytest.mark.parametrize("method", ["wilson", "houbolt"])

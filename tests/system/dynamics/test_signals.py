@@ -253,12 +253,15 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
         "method": "rk4",
         "step": 2e-5,
         "output_times": [0.1, 1.0, 3.0],
-        "checkpoint": tmp_path / "run.npz",
     }
-    whole = model.simulate(**settings)
-    cut = model.simulate(progress=lambda *_: os.kill(os.getpid(), signal.SIGINT), **settings)
+    path = tmp_path / "run.npz"
+    whole = model.simulate(execution=mstmm.Execution(checkpoint=path), **settings)
+    interrupting = mstmm.Execution(
+        checkpoint=path, progress=lambda *_: os.kill(os.getpid(), signal.SIGINT)
+    )
+    cut = model.simulate(execution=interrupting, **settings)
     assert cut.status is None
-    again = model.simulate(resume=True, **settings)
+    again = model.simulate(execution=mstmm.Execution(checkpoint=path, resume=True), **settings)
     for name in ("t", "q", "u", "work"):
         np.testing.assert_array_equal(getattr(again, name), getattr(whole, name))
 

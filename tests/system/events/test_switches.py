@@ -117,7 +117,7 @@ def test_a_motion_that_sticks_ends_with_a_reason(method: str) -> None:
 
 
 def test_a_limit_of_steps_is_the_only_one() -> None:
-    result = moved("-10*sign(u)", 10.0, u=0.3, max_steps=9000)
+    result = moved("-10*sign(u)", 10.0, u=0.3, method=mstmm.methods.Method(max_steps=9000))
     assert result.status is Status.TOO_MANY_STEPS and "more steps than allowed" in result.message
     assert any("chatters" in text for text in result.warnings)
 
@@ -189,7 +189,9 @@ STICKING = [
 def test_implicit_methods_name_what_a_motion_sticks_to(
     effort: str, method: str, step: float | None
 ) -> None:
-    result = moved(effort, 5.0, u=0.3, method=method, step=step, max_steps=5000)
+    result = moved(
+        effort, 5.0, u=0.3, method=mstmm.methods.Method(method, max_steps=5000), step=step
+    )
     assert result.status in (Status.TOO_MANY_STEPS, Status.NOT_CONVERGED), result.message
     words = ("switches there", "chatters from")
     assert any(f"'sign(u)' (effort of hinge \"h\") {x}" in result.message for x in words)
@@ -197,5 +199,7 @@ def test_implicit_methods_name_what_a_motion_sticks_to(
 
 
 def test_a_switch_far_from_the_end_is_not_blamed() -> None:
-    result = moved("-1e-3*sign(u) - q", 50.0, u=1.0, method="kvaerno5", max_steps=20)
+    result = moved(
+        "-1e-3*sign(u) - q", 50.0, u=1.0, method=mstmm.methods.Method("kvaerno5", max_steps=20)
+    )
     assert result.status is Status.TOO_MANY_STEPS and "sign(u)" not in result.message

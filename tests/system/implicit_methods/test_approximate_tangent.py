@@ -59,7 +59,9 @@ def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
     exact = model.simulate(0.5, rtol=1e-13, atol=1e-14, output_times=[0.5]).q
     errors = []
     for count in (32, 128):
-        run = model.simulate(0.5, method, 0.5 / count, output_times=[0.5], tangent="laws")
+        run = model.simulate(
+            0.5, mstmm.methods.Implicit(method, tangent="laws"), 0.5 / count, output_times=[0.5]
+        )
         assert run.success, run.message
         assert run.statistics is not None
         assert run.statistics.approximate_tangents == run.statistics.tangents == count
@@ -67,8 +69,11 @@ def test_methods_that_allow_it_keep_their_order(method: str, name: str) -> None:
     assert np.log2(errors[0] / errors[1]) / 2 > get(method).order - 0.25, errors
 
 
-def counted(model: mstmm.Model, method: str, **how: Any) -> tuple[Any, Statistics]:
-    run = model.simulate(0.4, method, output_times=[0.2, 0.4], **how)
+def counted(
+    model: mstmm.Model, method: str, tangent: str = "auto", **how: Any
+) -> tuple[Any, Statistics]:
+    chosen = mstmm.methods.Implicit(method, tangent=tangent)
+    run = model.simulate(0.4, chosen, output_times=[0.2, 0.4], **how)
     assert run.success, run.message
     assert run.statistics is not None
     return run.q, run.statistics
@@ -99,7 +104,11 @@ def test_where_laws_do_not_contract_exact_tangents_follow() -> None:
 
     def run(tangent: str) -> Statistics:
         found = model.simulate(
-            0.3, "genalpha", 0.02, initial=(q, u), output_times=[0.3], tangent=tangent
+            0.3,
+            mstmm.methods.GeneralizedAlpha("genalpha", tangent=tangent),
+            0.02,
+            initial=(q, u),
+            output_times=[0.3],
         )
         assert found.success, found.message
         assert found.statistics is not None
@@ -120,7 +129,12 @@ def test_an_iteration_by_laws_is_a_residual_and_a_solution() -> None:
     model = compiled({"gravity": [0, 0, 0], "body": [body], "hinge": [hinge]})
     steps = 100
     for tangent in ("exact", "laws"):
-        run = model.simulate(0.5, "genalpha", 0.5 / steps, output_times=[0.5], tangent=tangent)
+        run = model.simulate(
+            0.5,
+            mstmm.methods.GeneralizedAlpha("genalpha", tangent=tangent),
+            0.5 / steps,
+            output_times=[0.5],
+        )
         counts = run.statistics
         assert counts is not None
         assert counts.tangents == 1
@@ -190,7 +204,9 @@ def test_methods_that_need_the_exact_one_say_so() -> None:
 
 def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
     model = compiled(everything())
-    result = model.simulate(0.1, "rodas4pw", rtol=1e-4, atol=1e-7, tangent="laws")
+    result = model.simulate(
+        0.1, mstmm.methods.Implicit("rodas4pw", tangent="laws"), rtol=1e-4, atol=1e-7
+    )
     result.save(tmp_path / "by_laws.nc")
     loaded = mstmm.load_result(tmp_path / "by_laws.nc")
     assert loaded.statistics == result.statistics
@@ -200,9 +216,11 @@ def test_a_result_keeps_which_tangent_was_taken(tmp_path: Any) -> None:
 def test_a_batch_takes_it_too() -> None:
     model = compiled(everything())
     q, u = model.initial_state()
-    how: dict[str, Any] = {"method": "rodas4pw", "step": 0.01, "tangent": "laws"}
-    batch = model.simulate_batch((q[None], u[None]), t_end=0.2, **how)
-    alone = model.simulate(0.2, output_times=[0.2], **how)
+    by_laws, by_all = (
+        mstmm.methods.Implicit("rodas4pw", tangent=tangent) for tangent in ("laws", "exact")
+    )
+    batch = model.simulate_batch((q[None], u[None]), t_end=0.2, method=by_laws, step=0.01)
+    alone = model.simulate(0.2, by_laws, step=0.01, output_times=[0.2])
     assert batch.q[0, -1] == pytest.approx(alone.q[-1], abs=1e-12)
-    exact = model.simulate(0.2, output_times=[0.2], **{**how, "tangent": "exact"})
+    exact = model.simulate(0.2, by_all, step=0.01, output_times=[0.2])
     assert np.abs(exact.q[-1] - alone.q[-1]).max() > 1e-12

@@ -46,13 +46,13 @@ def test_a_batch_takes_numbers_of_the_scene_and_a_radius() -> None:
     name = "hinge0.law.stiffness[0]"
     q, u = model.initial_state()
     starts = np.tile(q, (3, 1)), u
-    how: dict[str, Any] = {"method": "genalpha", "step": 0.01, "radius": 0.5}
+    how: dict[str, Any] = {"method": mstmm.methods.GeneralizedAlpha(radius=0.5), "step": 0.01}
     batch = model.simulate_batch(starts, {name: stiffness}, t_end=0.3, output_times=[0.3], **how)
     assert batch.success.all()
     for i in range(3):
         alone = model.with_parameters({name: stiffness[i]}).simulate(0.3, output_times=[0.3], **how)
         assert batch.q[i] == pytest.approx(alone.q, abs=1e-9)
-    how["radius"] = 0.1
+    how["method"] = mstmm.methods.GeneralizedAlpha(radius=0.1)
     other = model.simulate_batch(starts, {name: stiffness}, t_end=0.3, output_times=[0.3], **how)
     assert np.abs(other.q - batch.q).max() > 1e-7
 
@@ -75,9 +75,11 @@ def test_a_run_resumed_from_a_file_has_the_bytes_of_a_whole_one(
     whole = model.simulate(1.0, method, **how)
     with monkeypatch.context() as patch:
         interrupted(patch, 0.4)
-        cut = model.simulate(1.0, method, checkpoint=path, **how)
+        cut = model.simulate(1.0, method, execution=mstmm.Execution(checkpoint=path), **how)
     assert cut.status is None and 0.4 < cut.t[-1] < 1.0
-    rest = model.simulate(1.0, method, checkpoint=path, resume=True, **how)
+    rest = model.simulate(
+        1.0, method, execution=mstmm.Execution(checkpoint=path, resume=True), **how
+    )
     assert rest.success, rest.message
     for name in ("t", "q", "u", "work", "event"):
         assert getattr(whole, name).tobytes() == getattr(rest, name).tobytes(), name

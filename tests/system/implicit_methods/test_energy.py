@@ -25,7 +25,7 @@ def energy(frequency: float, method: str, radius: float | None = None) -> Array:
     body = {"name": "mass", "mass": 1.0}
     scene = mstmm.Scene(gravity=(0, 0, 0), body=[body], hinge=[hinge])
     model = mstmm.compile(scene, engine="looped")
-    run = model.simulate(COUNT, method, 1.0, radius=radius)
+    run = model.simulate(COUNT, mstmm.methods.GeneralizedAlpha(method, radius=radius), 1.0)
     assert run.success, run.message
     found = np.asarray(run.energy())
     return np.asarray(found / found[0])

@@ -165,7 +165,9 @@ def test_the_energy_of_a_vibration_that_no_step_resolves_leaves(
     method: str, radius: float | None
 ) -> None:
     """A spring of 1e6 N/m holds 0.5 J, the step is five of its periods; the rods keep theirs."""
-    run = bushed(1e6, stretch=1e-3).simulate(2.0, method, 0.01, radius=radius)
+    run = bushed(1e6, stretch=1e-3).simulate(
+        2.0, mstmm.methods.GeneralizedAlpha(method, radius=radius), 0.01
+    )
     assert run.success, run.message
     energy = np.asarray(run.energy())
     assert energy[-1] - energy[0] == pytest.approx(-0.45, abs=0.15)
@@ -174,7 +176,9 @@ def test_the_energy_of_a_vibration_that_no_step_resolves_leaves(
 @pytest.mark.parametrize("method, radius", [("newmark", None), ("genalpha", 1.0)])
 def test_what_is_not_damped_does_not_grow(method: str, radius: float | None) -> None:
     """As long as Newton's iteration is made to converge: what it leaves is all that drives it."""
-    run = bushed(1e6, stretch=1e-3).simulate(12.0, method, 0.01, radius=radius)
+    run = bushed(1e6, stretch=1e-3).simulate(
+        12.0, mstmm.methods.GeneralizedAlpha(method, radius=radius), 0.01
+    )
     assert run.success, run.message
     energy = np.asarray(run.energy())
     assert np.abs(energy - energy[0]).max() < 8.0

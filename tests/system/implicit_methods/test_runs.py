@@ -123,7 +123,9 @@ def test_a_batch_makes_the_runs_of_its_trajectories() -> None:
 
 def test_a_result_keeps_what_was_counted(tmp_path: Any) -> None:
     model = mstmm.compile(stiff(), engine="looped")
-    result = model.simulate(0.3, "genalpha", rtol=1e-4, atol=1e-7, radius=0.4)
+    result = model.simulate(
+        0.3, mstmm.methods.GeneralizedAlpha("genalpha", radius=0.4), rtol=1e-4, atol=1e-7
+    )
     path = tmp_path / "stiff.nc"
     result.save(path)
     loaded = mstmm.load_result(path)
@@ -139,4 +141,6 @@ def test_a_radius_is_asked_of_methods_that_take_one() -> None:
         with pytest.raises(
             SceneError, match="has no such parameter; methods with a radius are genalpha, dttmm"
         ):
-            model.simulate(0.1, method, radius=0.5)
+            model.simulate(0.1, mstmm.methods.GeneralizedAlpha(method, radius=0.5))
+        with pytest.raises(SceneError, match=f'radius: method "{method}" has no such option'):
+            mstmm.methods.method(method, radius=0.5)

@@ -224,6 +224,6 @@ def test_a_start_that_cannot_be_closed_is_refused() -> None:
 
 
 def test_a_drive_beyond_the_mechanism_ends_the_run() -> None:
-    result = rocker_driven().simulate(5.0, rtol=1e-6, max_steps=20000)
+    result = rocker_driven().simulate(5.0, mstmm.methods.Method(max_steps=20000), rtol=1e-6)
     assert not result.success
     assert result.t[-1] < 2.0

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 from ....array_validation import Array
+from ....runtime.integrate.methods import ClassicalDiscreteTime
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
 from ...parameter_scale import COUNT_SCALE
@@ -22,10 +23,8 @@ def _without_predictor(steps: int) -> Array:
 
 
 def _with_predictor(steps: int) -> Array:
-    run = simulate_to_end(
-        double_pendulum(), T_END, "dttmm-classical", T_END / steps, output_times=[T_END],
-        scheme="newmark",
-    )  # fmt: skip
+    method = ClassicalDiscreteTime(scheme="newmark")
+    run = simulate_to_end(double_pendulum(), T_END, method, T_END / steps, output_times=[T_END])
     return run.q[-1]
 
 

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from ....array_validation import Array
+from ....runtime.integrate.methods import ClassicalDiscreteTime
 from ....runtime.model.model import Model
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
@@ -54,10 +55,8 @@ def _error(rate: float, additive: bool) -> float:
     if additive:
         coordinates = additive_rotations.final_coordinates(_two_rods(), step, steps, RADIUS)
     else:
-        coordinates = simulate_to_end(
-            _two_rods(), T_END, "dttmm-classical", step, output_times=[T_END],
-            scheme=f"generalised-alpha:{RADIUS}",
-        ).q[-1]  # fmt: skip
+        method = ClassicalDiscreteTime(scheme=f"generalised-alpha:{RADIUS}")
+        coordinates = simulate_to_end(_two_rods(), T_END, method, step, output_times=[T_END]).q[-1]
     return float(np.abs(coordinates - _exact()).max())
 
 

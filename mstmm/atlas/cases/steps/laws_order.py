@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from ....array_validation import Array
+from ....runtime.integrate.methods import Implicit
 from ....runtime.model.model import Model
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import simulate_to_end
@@ -33,9 +34,8 @@ def _rodas4_error(step: float) -> float:
 
 def _rodas4pw_error(step: float) -> float:
     arm, exact = _arm()
-    run = simulate_to_end(
-        arm, T_END, "rodas4pw", T_END / round(T_END / step), output_times=[T_END], tangent="laws"
-    )
+    method = Implicit("rodas4pw", tangent="laws")
+    run = simulate_to_end(arm, T_END, method, T_END / round(T_END / step), output_times=[T_END])
     return float(np.abs(run.q[-1] - exact).max())
 
 

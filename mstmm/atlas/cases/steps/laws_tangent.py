@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ....runtime.integrate.methods import Implicit
 from ...case_definition import CaseDefinition, MethodDefinition
 from ...error_measures import relative_growth
 from ...parameter_scale import LOG_SCALE
@@ -12,7 +13,8 @@ STEP, STEPS = 0.01, 400
 
 def _growth(rate: float, tangent: str) -> float:
     """`rate` is the step times the angular frequency of the rod."""
-    return relative_growth(hanging_rod(rate / STEP), STEP, STEPS, "ros34pw2", tangent=tangent)
+    method = Implicit("ros34pw2", tangent=tangent)
+    return relative_growth(hanging_rod(rate / STEP), STEP, STEPS, method)
 
 
 CASE = CaseDefinition(

@@ -142,7 +142,10 @@ def test_iterated_steps_forget_where_they_were_expanded() -> None:
     """Only the predictor of the steps that stall is another one."""
     rods, h, steps = double_pendulum(), 0.01, 20
     good = rods.simulate(
-        steps * h, "dttmm-classical", h, scheme="newmark", iterations=20, output_times=[steps * h]
+        steps * h,
+        mstmm.methods.ClassicalDiscreteTime("dttmm-classical", scheme="newmark", iterations=20),
+        h,
+        output_times=[steps * h],
     )
     held = no_predictor.final_coordinates(rods, h, steps, iterations=20)
     assert np.abs(held - good.q[-1]).max() < 1e-12
@@ -219,8 +222,11 @@ def test_by_laws_alone_the_order_falls(method: str, order: int) -> None:
 def test_steps_by_laws_are_those_of_a_run_where_it_offers_them(method: str) -> None:
     arm, n = elbow_with_spring(1e5, 2e3), 32
     run = arm.simulate(
-        ELBOW_END, method, ELBOW_END / n, output_times=[ELBOW_END], tangent="laws"
-    )  # fmt: skip
+        ELBOW_END,
+        mstmm.methods.Implicit(method, tangent="laws"),
+        ELBOW_END / n,
+        output_times=[ELBOW_END],
+    )
     assert (
         np.abs(
             LawTangentSteps(arm, method).fixed_step_states(ELBOW_END / n, n)[-1, 0] - run.q[-1]

@@ -84,9 +84,13 @@ def test_printed_equations(radius: float, swung: mstmm.Model) -> None:
     h, steps = 0.02, 60
     q, u, _ = printed(radius, h, steps)
     result = swung.simulate(
-        h * steps, "genalpha-index3", step=h, radius=radius, rtol=1e-12, atol=1e-13,
+        h * steps,
+        mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius),
+        step=h,
+        rtol=1e-12,
+        atol=1e-13,
         output_times=np.linspace(0.0, h * steps, steps + 1),
-    )  # fmt: skip
+    )
     assert result.success, result.message
     # Iterations with fixed steps end at 1e-3 of a step's error.
     assert np.abs(result.q[:, :3] - q).max() < 3e-6
@@ -143,7 +147,12 @@ def test_energy_falls_as_slowly() -> None:
     lost = {}
     for method in ("genalpha", "genalpha-index3"):
         for radius in (0.5, 0.9):
-            run = model.simulate(20.0, method, step=5e-3, radius=radius, output_times=[0.0, 20.0])
+            run = model.simulate(
+                20.0,
+                mstmm.methods.GeneralizedAlpha(method, radius=radius),
+                step=5e-3,
+                output_times=[0.0, 20.0],
+            )
             assert run.success, run.message
             energy = run.energy_components()["kinetic"]
             lost[method, radius] = 1 - float(energy[1] / energy[0])
@@ -209,7 +218,9 @@ def test_a_break_just_before_the_grid(method: str, before: float, bar: mstmm.Mod
 
 def off_in_ticks(model: mstmm.Model, tick: float, step: float, radius: float) -> float:
     """`off` of a session in ticks of `tick` s."""
-    session = model.session(method="genalpha-index3", step=step, radius=radius)
+    session = model.session(
+        method=mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=radius), step=step
+    )
     exact, errors = model.session(method="dop853", rtol=1e-11, atol=1e-13), []
     while session.t < END:
         session.advance(tick)
@@ -254,17 +265,17 @@ def test_equal_runs_give_equal_bits(bar: mstmm.Model) -> None:
 @pytest.mark.parametrize(
     ("asked", "words"),
     [
-        ({"method": "genalpha-index3", "radius": 1.0}, "radius = 1: .* would have no damping"),
         (
-            {"method": "newmark-index3"},
-            "newmark-index3.* would have no damping.*, or newmark, which",
+            mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=1.0),
+            "radius = 1: .* would have no damping",
         ),
-        ({"method": "rk4-index3"}, 'method "rk4-index3" is not known'),
+        ("newmark-index3", "newmark-index3.* would have no damping.*, or newmark, which"),
+        ("rk4-index3", 'method "rk4-index3" is not known'),
     ],
 )
-def test_refused(asked: dict[str, Any], words: str, swung: mstmm.Model) -> None:
+def test_refused(asked: str | mstmm.methods.Method, words: str, swung: mstmm.Model) -> None:
     with pytest.raises(SceneError, match=words):
-        swung.simulate(0.1, step=1e-2, **asked)
+        swung.simulate(0.1, asked, step=1e-2)
 
 
 def test_a_tree_has_nothing_to_ask() -> None:

@@ -72,7 +72,10 @@ def test_a_beam_that_slides_rings_as_its_shape_alone() -> None:
     scene = {"gravity": [0, -WEIGHT, 0], "body": [shoe], "beam": [beam], "hinge": hinges}
     model, end = mstmm.compile(mstmm.Scene(**scene)), 0.7
     run = model.simulate(
-        end, "genalpha-index3", step=1e-4, radius=0.9, output_times=np.linspace(0.0, end, 8)
+        end,
+        mstmm.methods.GeneralizedAlpha("genalpha-index3", radius=0.9),
+        step=1e-4,
+        output_times=np.linspace(0.0, end, 8),
     )
     wave = np.pi / LENGTH
     speed = wave**2 * np.sqrt(STIFF / HEAVY)

@@ -116,7 +116,7 @@ def stiff(count: int, k: float, zeta: float) -> mstmm.Model:
 
 def test_stiff_motion_is_reached_by_an_implicit_method() -> None:
     model = stiff(4, 1e8, 1.0)
-    run = model.simulate(1.0, error=1e-3, error_of="rod3.tip.position")
+    run = model.simulate(1.0, error=mstmm.ErrorRequest(1e-3, of="rod3.tip.position"))
     known = run.achieved_error
     assert known is not None and known.is_met
     assert known.method in ("rodas4p2", "rodas5p")
@@ -147,7 +147,7 @@ def boom(torque: float, modes: int = 3, zeta: float = 0.0) -> mstmm.Model:
 @pytest.mark.parametrize("asked", [1e-3, 1e-5])
 def test_a_beam_that_begins_to_vibrate_is_tried_by_the_exponential_method(asked: float) -> None:
     model, t_end = boom(1.0), 2.0
-    run = model.simulate(t_end, error=asked, error_of="boom.tip.position")
+    run = model.simulate(t_end, error=mstmm.ErrorRequest(asked, of="boom.tip.position"))
     known = run.achieved_error
     assert known is not None and known.is_met and known.estimate is not None
     assert known.runs[0].method == "exprb32" and not known.runs[0].failure
@@ -259,7 +259,7 @@ def test_an_event_that_stops_the_run() -> None:
 
 
 def test_a_run_that_fails_is_returned_as_it_is() -> None:
-    run = pendulums(2, 2.0).simulate(5.0, error=1e-5, max_steps=3)
+    run = pendulums(2, 2.0).simulate(5.0, mstmm.methods.Method(max_steps=3), error=1e-5)
     known = run.achieved_error
     assert known is not None and known.estimate is None and not run.success
     assert known.runs[0].failure == run.message
@@ -272,7 +272,7 @@ def test_a_later_run_that_fails_leaves_the_one_before() -> None:
     assert first is not None
     loose = first.runs[0]
     alone = model.simulate(5.0, rtol=loose.rtol, atol=loose.atol)
-    run = model.simulate(5.0, error=1e-8, max_steps=_counts(alone).steps + 1)
+    run = model.simulate(5.0, mstmm.methods.Method(max_steps=_counts(alone).steps + 1), error=1e-8)
     known = run.achieved_error
     assert known is not None and not known.is_met and run.success
     assert "failed" in known.reason and known.runs[-1].failure
@@ -316,13 +316,17 @@ def test_a_run_of_no_length() -> None:
 def test_progress_never_falls() -> None:
     told: list[float] = []
     model = pendulums(3, 2.0)
-    run = model.simulate(8.0, error=1e-4, progress=lambda t, end: told.append(t / end))
+    run = model.simulate(
+        8.0, error=1e-4, execution=mstmm.Execution(progress=lambda t, end: told.append(t / end))
+    )
     assert run.success
     assert told == sorted(told) and all(0 <= part <= 1 for part in told)
 
 
 def test_a_saved_result_tells_it(tmp_path: Path) -> None:
-    run = pendulums(1, 2.0).simulate(3.0, error=1e-6, error_of=["rod0.tip.x", "energy.kinetic"])
+    run = pendulums(1, 2.0).simulate(
+        3.0, error=mstmm.ErrorRequest(1e-6, of=["rod0.tip.x", "energy.kinetic"])
+    )
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
     assert again.achieved_error == run.achieved_error
     assert again.trusted == run.trusted
@@ -349,10 +353,9 @@ def test_a_run_without_it_tells_nothing() -> None:
         ({"error": 1e-6, "method": "rk4"}, "has fixed steps"),
         ({"error": 1e-6, "method": "dttmm-classical"}, "has fixed steps"),
         ({"error": 1e-6, "method": "dop835"}, "not known"),
-        ({"error": 1e-6, "checkpoint": "x"}, "no checkpoint"),
-        ({"error": 1e-6, "resume": True}, "no checkpoint"),
-        ({"error": 1e-6, "error_of": "rod0.tipp.x"}, "did you mean"),
-        ({"error_of": "energy"}, "give error too"),
+        ({"error": 1e-6, "execution": mstmm.Execution(checkpoint="x")}, "no checkpoint"),
+        ({"error": 1e-6, "execution": mstmm.Execution(resume=True)}, "no checkpoint"),
+        ({"error": mstmm.ErrorRequest(1e-6, of="rod0.tipp.x")}, "did you mean"),
     ],
 )
 def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> None:
@@ -361,7 +364,7 @@ def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> 
 
 
 def test_an_error_in_a_unit_may_be_above_one() -> None:
-    run = pendulums(1, 1.5).simulate(3.0, error=2.0, error_of="pin0.force")
+    run = pendulums(1, 1.5).simulate(3.0, error=mstmm.ErrorRequest(2.0, of="pin0.force"))
     known = run.achieved_error
     assert known is not None and known.is_met and known.unit == "N"
     again = pendulums(1, 1.5).simulate(3.0, output_times=run.t)

@@ -28,7 +28,7 @@ ASKED: dict[str, Callable[[mstmm.Model], Any]] = {
         method: lambda m, method=method: m.simulate(0.1, method, step=1e-3)  # type: ignore[misc]
         for method in ("dttmm", "dttmm-classical")
     },
-    "laws alone": lambda m: m.simulate(0.1, "esdirk436", tangent="laws"),
+    "laws alone": lambda m: m.simulate(0.1, mstmm.methods.Implicit("esdirk436", tangent="laws")),
     "least squares": lambda m: mstmm.compile(m.scene, sweep="qr"),
 }
 

@@ -122,7 +122,7 @@ def test_a_trajectory_that_fails_disturbs_no_other(engine: str) -> None:
 def test_too_many_steps_is_a_matter_of_each_trajectory(pins: Model) -> None:
     q, u = states(pins, 6)
     u[2] *= 60.0
-    batch = pins.simulate_batch((q, u), **RUN | {"max_steps": 60})
+    batch = pins.simulate_batch((q, u), method=mstmm.methods.Method(max_steps=60), **RUN)
     assert np.flatnonzero(~batch.success).tolist() == [2]
     assert "more steps than allowed" in batch.messages[2]
 

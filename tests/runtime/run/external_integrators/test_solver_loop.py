@@ -134,7 +134,9 @@ def test_no_output_times_and_a_last_one_that_a_coarse_run_does_not_reach(method:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_largest_number_of_steps(method: str) -> None:
-    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(5.0, method=method, max_steps=7)
+    run = mstmm.compile(pins(2, [0.3, 0.4])).simulate(
+        5.0, method=mstmm.methods.Method(method, max_steps=7)
+    )
     assert run.status is Status.TOO_MANY_STEPS and "more steps than allowed" in run.message
     assert run.statistics is not None and run.statistics.steps == 7 and len(run.t) == 8
 
@@ -194,7 +196,7 @@ def test_settings_that_make_no_sense() -> None:
     with pytest.raises(mstmm.SceneError, match="not known"):
         model.simulate(1.0, method="scipy-Euler")
     with pytest.raises(mstmm.SceneError, match="writes no checkpoints"):
-        model.simulate(1.0, method="scipy-RK45", checkpoint="run.npz")
+        model.simulate(1.0, method="scipy-RK45", execution=mstmm.Execution(checkpoint="run.npz"))
 
 
 def test_cvode_refuses_a_scene_in_which_nothing_moves() -> None:
