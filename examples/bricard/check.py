@@ -69,7 +69,9 @@ def main() -> None:
     """All three statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {loops.cut_hinges[0]}; {loops.rank} of {len(loops.constraint_rows)} rows count")
+    print(
+        f"cut: {loops.cut_hinges[0]}; {loops.rank} of {len(loops.constraint_rows)} rows independent"
+    )
     assert (len(loops.constraint_rows), loops.rank, loops.mobility) == (5, 4, 1)
 
     result = model.simulate(10.0, rtol=1e-9, output_times=TIMES)

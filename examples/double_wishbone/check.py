@@ -1,6 +1,6 @@
 """A corner of a car over a bump, then steered, against geometry and Lagrange's equations.
 
-Statements: (1) balls close two loops by six rows that all count, and two motions are left.  (2) The
+Statements: (1) balls close two loops by six independent rows, and the mobility is 2.  (2) The
 car stands still before the bump.  (3) Over three seconds upright and tie rod are where circles and
 spheres put them for the angle of the lower wishbone and the place of the rack, to 1e-9 m, and loops
 are closed.  (4) Accelerations of car and wishbone are those of Lagrange's equations for thirty mass

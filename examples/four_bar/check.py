@@ -61,7 +61,9 @@ def main() -> None:
     """All four statements."""
     model = mstmm.compile(mstmm.load_scene(SCENE))
     loops = model.loops
-    print(f"cut: {loops.cut_hinges[0]}; {loops.rank} of {len(loops.constraint_rows)} rows count")
+    print(
+        f"cut: {loops.cut_hinges[0]}; {loops.rank} of {len(loops.constraint_rows)} rows independent"
+    )
     assert (loops.rank, len(loops.constraint_rows), loops.mobility) == (2, 5, 0)
 
     times = np.linspace(0.0, 3 * TURN, 601)

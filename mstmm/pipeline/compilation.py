@@ -125,7 +125,7 @@ def compile_level(
             "bake = True writes the numbers of the scene into its code; "
             'it requires engine = "fused"'
         )
-    obstacle = "asked for" if engine == "looped" else ""
+    obstacle = "requested" if engine == "looped" else ""
     max_bodies = MAX_BODIES if engine == "fused" else DEFAULT_MAX_BODIES
 
     fuser = FusionFactory(definitions, obstacle, bake, max_bodies)

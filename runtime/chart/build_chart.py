@@ -192,7 +192,7 @@ class _ChartBuilder:
         if reference.stop_event:
             self.report_status(f"runs end before {self.request.t_end:g} s: {reference.stop_event}")
         if reference.is_static:
-            self.report_status("nothing moves in this scene: no methods are compared")
+            self.report_status("the scene has no degrees of freedom: no methods are compared")
 
     def _richest_model(self, variants: Sequence[Variant]) -> Model:
         """Model of the richest level; compiled like the other levels if there are any."""

@@ -123,7 +123,7 @@ def _scene_notes(chart: ChartRecord) -> list[str]:
     ended = chart.reference.stop_event
     notes = [f"Runs end before {chart.t_end:g} s: {ended}."] if ended else []
     if chart.reference.is_static:
-        notes.append("Nothing moves in this scene: no methods are compared.")
+        notes.append("The scene has no degrees of freedom: no methods are compared.")
     return [*notes, *(f"Warning: {text}" for text in chart.warnings)]
 
 

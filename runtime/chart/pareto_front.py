@@ -92,7 +92,7 @@ def recommend(points: Sequence[Point], error: float, reference: Reference) -> Po
         raise SceneError(f"error = {error!r}: expected {_EXPECTED}")
     if reference.is_static:
         raise NumericalFailure(
-            "nothing moves in this scene: all settings give the same result, there is nothing to "
+            "the scene has no degrees of freedom: all settings give the same result, nothing to "
             "recommend"
         )
     if error < reference.smallest_resolved_error:

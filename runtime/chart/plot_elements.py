@@ -141,7 +141,7 @@ def _empty_reason(chart: ChartRecord, shown: Sequence[Point]) -> str:
     if shown:
         return ""
     if chart.reference.is_static:
-        return "nothing moves in this scene"
+        return "the scene has no degrees of freedom"
     errors = [point.error for point in chart.points if point.error is not None]
     return "no run has an error above zero" if errors else "no run was completed"
 

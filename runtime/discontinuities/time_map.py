@@ -175,10 +175,8 @@ def _map_expressions(
 
 def _pole_message(one: ActiveExpression) -> str:
     return (
-        f"{one.description} ({_quote_expression(one)}) grows beyond all bounds there, too fast "
-        f"for any "
-        f"motion to "
-        "pass; end the run before that time, or limit it, such as by min or max"
+        f"{one.description} ({_quote_expression(one)}) is unbounded there; end the run before that "
+        "time, or limit it, for example by min or max"
     )
 
 
@@ -186,11 +184,9 @@ def _pole_risk(one: ActiveExpression, t: float) -> Risk:
     return Risk(
         "pole",
         one.description,
-        f"a part of {one.description} ({_quote_expression(one)}) grows beyond all bounds at t = "
-        f"{t:.6g} "
-        f"s: unless "
-        "its factor vanishes there, no motion passes",
-        "end the run before that time, or limit the part, such as by min or max",
+        f"a part of {one.description} ({_quote_expression(one)}) is unbounded at t = {t:.6g} s: "
+        "the run stops there unless a factor of this part vanishes",
+        "end the run before that time, or limit the part, for example by min or max",
         seen_before_run=True,
     )
 
@@ -213,10 +209,8 @@ def _switches_risk(one: ActiveExpression, since: float) -> Risk:
     return Risk(
         "switches",
         one.description,
-        f"{one.description} ({_quote_expression(one)}) switches too often for a step to end at "
-        f"every "
-        f"switching "
-        f"time: from t = {since:.6g} s on some are missed",
+        f"{one.description} ({_quote_expression(one)}) switches too often for steps to end at "
+        f"every switch: some are missed from t = {since:.6g} s on",
         "give max_step, or a shorter run",
         seen_before_run=True,
     )
@@ -227,8 +221,7 @@ def _narrow_load_risk(one: ActiveExpression, longest: float) -> Risk:
         "narrow-load",
         one.description,
         f"{one.description} ({_quote_expression(one)}) changes too often to be examined completely "
-        f"before the "
-        f"run; steps stay below {longest:.2g} s where it was not examined",
+        f"before the run; steps are limited to {longest:.2g} s where it was not examined",
         "give max_step",
         seen_before_run=True,
     )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _END_DISTANCE = 1e-6
 
 #: Remedy at the end of messages that name an expression.
-REMEDY = "keep it finite where the motion goes"
+REMEDY = "keep it finite along the motion"
 
 
 def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array) -> str:
@@ -39,7 +39,7 @@ def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array)
     for first in layout.quaternions:
         if not np.linalg.norm(q[first : first + 4]) > 0:
             return (
-                f"the quaternion that begins with {layout.q_name(int(first))} has zero length at "
+                f"the quaternion starting at {layout.q_name(int(first))} has zero length at "
                 f"t = {t:.9g} s; the identity rotation is 1, 0, 0, 0"
             )
     for location, drive in _drive_expressions(scene) if model.n_drives else ():
@@ -57,7 +57,8 @@ def find_nonfinite_expression(engine: EngineCalls, t: float, q: Array, u: Array)
 def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array) -> str:
     """Message that names an expression with a non-finite derivative at a state, or "".
 
-    Example: 'hinge "pin": law.effort[0] = "sqrt(q)" has no finite slope along q at t = 0 s'.  Only
+    Example: 'hinge "pin": law.effort[0] = "sqrt(q)" has no finite derivative with respect to q at
+    t = 0 s'.  Only
     derivatives that implicit methods need are tested.
     """
     for location, expression, values in _expressions_with_values(engine, t, q, u):
@@ -65,9 +66,9 @@ def find_nonfinite_derivative(engine: EngineCalls, t: float, q: Array, u: Array)
             is_state_dependent = name.text == "t" or name.quantity in ("q", "u")
             if is_state_dependent and not math.isfinite(slope):
                 return (
-                    f"{_quote_expression(location, expression)} has no finite slope along "
-                    f"{name.text} at "
-                    f"t = {t:.9g} s, which implicit methods need; make it smooth there, such as "
+                    f"{_quote_expression(location, expression)} has no finite derivative "
+                    f"with respect to {name.text} at t = {t:.9g} s, which implicit methods need; "
+                    "make it smooth there, such as "
                     "sqrt(abs(u) + 1e-6) for sqrt(abs(u)), or use an explicit method such as "
                     "dop853"
                 )
@@ -91,8 +92,7 @@ def describe_curve_end(engine: EngineCalls, t: float, q: Array, u: Array, ahead:
                 location = _quote_expression(f'constraint "{constraint.name}": curve[{k}]', entry)
                 return (
                     f"{location} ends at s = {end_s:.9g}, which the motion reaches near t = "
-                    f"{t:.9g} s; "
-                    f"{REMEDY}, or stop the run before that by an [[event]]"
+                    f"{t:.9g} s; {REMEDY}, or stop the run before that by an [[event]]"
                 )
     return ""
 

@@ -81,7 +81,7 @@ def _check_not_controlled(name: str, scene: Scene) -> None:
     if name in scene.controllers_by_input:
         raise SceneError(
             f'{_input_label(name)}: controller "{scene.controllers_by_input[name]}" sets this '
-            "input; add another to the expression that reads it"
+            "input; add another input to the expression that reads it"
         )
 
 

@@ -109,9 +109,9 @@ def followers(model: CompiledScene, name: str, t: float) -> DriveFactors:
             x in channels and channels[x].is_constant for x in names
         ):
             raise SceneError(
-                f'"{name}": the drive of hinge "{slots.name}" follows this input, and goes by time '
-                "besides; name the motion of the drive itself for an input, or let the input stand "
-                "still"
+                f'"{name}": the drive of hinge "{slots.name}" depends on this input and also '
+                "on time; use the motion of the drive itself as the input, or keep the input "
+                "constant"
             )
         rule = expression_derivatives(drive, lambda one: channels[one.text].value(t))
         found[slots.u + k] = sum(slope for one, slope in rule.items() if one.text == name)

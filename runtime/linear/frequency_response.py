@@ -195,7 +195,7 @@ def frequency_response(
             outputs = [name for name in linear.coordinate_names if not beams.has_coordinate(name)]
             if not outputs:
                 raise SceneError(
-                    "exact: all coordinates are shapes of beams; name outputs, such as "
+                    "exact: all coordinates are those of beam shapes; give outputs, such as "
                     f'"{beams.names[0]}.tip.y"'
                 )
     pushes = select_inputs(linear, inputs)
@@ -243,7 +243,7 @@ def angular_frequencies(omega: ArrayLike) -> Array:
     if wrong.size:
         raise SceneError(
             f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 and below "
-            f"{_FASTEST:g} in rad/s (of Hz 2 pi times as many)"
+            f"{_FASTEST:g} in rad/s (2 pi times the frequency in Hz)"
         )
     return found
 
@@ -254,7 +254,7 @@ def select_inputs(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequ
         return [channel(linear.model, name) for name in some_names("inputs", inputs)]
     pushes = linear.input_channels or linear.disturbance_channels
     if not pushes:
-        raise SceneError("frequency response: the model has no inputs; name some")
+        raise SceneError("frequency response: the model has no inputs; give inputs")
     return pushes
 
 
@@ -351,11 +351,11 @@ class _Sweep:
             if unknown < _GOOD:
                 break
         if not unknown < _LOST:
-            where = f': hinge "{self.engine.hinge_name(body)}"' if body >= 0 else ""
+            hinge_text = f' of hinge "{self.engine.hinge_name(body)}" and its outboard bodies'
+            where = hinge_text if body >= 0 else ""
             raise NumericalFailure(
-                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping"
-                f"{where} and what it carries answer without bound; add damping, or leave this "
-                "frequency out"
+                f"frequency response: omega = {omega:.9g} rad/s is an undamped resonance{where}; "
+                "add damping, or leave this frequency out"
             )
         return best
 

@@ -83,7 +83,7 @@ def require_names(what: str, names: Sequence[str]) -> Sequence[str]:
 def some_names(what: str, names: Sequence[str]) -> Sequence[str]:
     """Validated list of at least one name; SceneError for anything else."""
     if not require_names(what, names):
-        raise SceneError(f"{what} is empty: leave it out, or name some")
+        raise SceneError(f"{what} is empty: expected one name or more; give names, or leave it out")
     return names
 
 
@@ -97,8 +97,8 @@ def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tup
         if 0 <= one.drive < 2:
             instead = ", ".join(f'"{x}"' for x in accelerations(model, one.drive_factors))
             raise SceneError(
-                f'"{one.name}": matrices take the acceleration of a drive, {instead}, for an '
-                "input, and make the rest states; frequency_response takes this one too"
+                f'"{one.name}": in matrices the input of a drive is its acceleration, '
+                f"{instead}; use that, or frequency_response, which accepts this name too"
             )
     return found
 
@@ -172,8 +172,8 @@ def _drive_channel(model: CompiledScene, given: Input) -> Channel:
     ]
     if pushing:
         raise SceneError(
-            f'"{given.name}": drives follow this input, and the {pushing[0]} reads it besides; '
-            "give each an input of its own"
+            f'"{given.name}": drives follow this input, and the {pushing[0]} also reads it; '
+            "use separate inputs"
         )
     return Channel(given.name, given.unit, drive=0, drive_factors=followers(model, given.name, 0.0))
 
@@ -186,8 +186,8 @@ def _effort(model: CompiledScene, name: str, hinge: str, last: str) -> Channel:
     k = names.index(last)
     if slots.u + k not in model.free_speed_indices:
         raise SceneError(
-            f'"{name}": hinge "{hinge}" is driven there, so that an effort moves nothing; push '
-            "somewhere else, or take the motion of the drive for an input, such as "
+            f'"{name}": hinge "{hinge}" is driven there, so that an effort has no effect; use '
+            "another effort, or the motion of the drive as the input, such as "
             f'"{hinge}.{acceleration_name(slots.u_names[k])}"'
         )
     return Channel(name, effort_unit(slots.u_units[k]), speed=slots.u + k)

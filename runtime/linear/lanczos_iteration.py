@@ -74,7 +74,7 @@ def slowest(
             return found
         start = run.next_start
     raise NumericalFailure(
-        f"modes: {more} of {wanted} motions found before the iterations were exhausted; ask for "
+        f"modes: not converged: {more} of {wanted} modes found within the iteration limit; request "
         "fewer"
     )
 

@@ -239,8 +239,8 @@ class LinearEquations(AssessedResult):
         """Matrices K_driven and C_driven, each (n, drives)."""
         if self.drive_indices and self.frame_transform is not None:
             raise SceneError(
-                "fixed frame: motions of drives are not inputs there; leave them out, or push by "
-                "efforts and forces"
+                "fixed frame: motions of drives cannot be inputs; leave them out, or use efforts "
+                "and forces"
             )
         found = [self.drive_columns(((speed, 1.0),)) for speed in self.drive_indices]
         both = [(one.stiffness, one.damping) for one in found]
@@ -310,12 +310,12 @@ class LinearEquations(AssessedResult):
         """
         if self.frame_transform is not None:
             raise SceneError(
-                "symbolic: linear models in the fixed frame are numbers; take M, C and K"
+                "symbolic: linear models in the fixed frame are numerical; use M, C and K"
             )
         if self.constrained_motion is not None:
             raise SceneError(
-                "symbolic: linear models of closed loops are numbers; open the loop, or take M, C "
-                "and K as they are"
+                "symbolic: linear models of closed loops are numerical; open the loop, or use M, "
+                "C and K"
             )
         names = keep if isinstance(keep, str) else require_texts("keep", keep, "rod1.mass")
         found: SymbolicLinearModel = self.model.fusion.symbolic(self, names)

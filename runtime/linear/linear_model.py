@@ -60,7 +60,7 @@ class Linear(PublicMembers, StateSpace):
             raise SceneError(f"damped = {abbreviate(damped)}: expected True, False or None")
         self.check_count(count, len(self))
         if count is None:
-            check_dense_size(len(self), "the matrix of all motions")
+            check_dense_size(len(self), "the matrix of all modes")
         return modes(self, count, damped)
 
     @cached_property
@@ -93,11 +93,11 @@ class Linear(PublicMembers, StateSpace):
         if count is None:
             return
         if not isinstance(count, (int, np.integer)):
-            raise SceneError(f"count = {count!r}: expected a whole number of motions")
+            raise SceneError(f"count = {count!r}: expected a whole number of modes")
         if not most:
-            raise SceneError(f"count = {count!r}: nothing moves in this scene")
+            raise SceneError(f"count = {count!r}: the scene has no degrees of freedom")
         if isinstance(count, bool) or not 0 < count <= most:
-            raise SceneError(f"count = {count!r}: expected a number of motions from 1 to {most}")
+            raise SceneError(f"count = {count!r}: expected a number of modes from 1 to {most}")
 
     def frequency_response(
         self,

@@ -54,5 +54,6 @@ def matrices(engine: LoopedEngine, state: State, free: Sequence[int]) -> Matrice
 def _no_slope(engine: LoopedEngine, state: State) -> NumericalFailure:
     cause = find_nonfinite_derivative(engine, state.t, state.q, state.u)
     return NumericalFailure(
-        f"the scene is not linear near this state: {cause or 'a slope of its efforts is no number'}"
+        "the scene cannot be linearised at this state: "
+        f"{cause or 'a derivative of its efforts is not finite'}"
     )

@@ -104,6 +104,6 @@ def _general(linear: LinearEquations, c: Array) -> Modes:
 def _no_inertia(linear: LinearEquations) -> NumericalFailure:
     names = ", ".join(linear.coordinate_names[:3])
     return NumericalFailure(
-        f"modes: the mass matrix of {names}, ... is not positive, so that some motion has no "
-        "frequency; give what these move inertia"
+        f"modes: the mass matrix of {names}, ... is not positive definite, so that a mode has "
+        "no frequency; give the bodies that they move inertia"
     )

@@ -109,8 +109,9 @@ class Modes(PublicMembers, AssessedResult):
             k = int(self.eigenvalues.real.argmax())
             moving = abbreviate_names(self.dominant_coordinates(k))
             yield information(
-                "unstable", moving, f"unstable: a motion of {moving} grows with {growing:.4g} 1/s",
-                "small motions leave this state; choose a stable one",
+                "unstable", moving,
+                f"unstable: a motion of {moving} grows at a rate of {growing:.4g} 1/s",
+                "linearise about a stable state",
             )  # fmt: skip
         free = np.flatnonzero(self.omega == 0)
         if len(free):
@@ -119,8 +120,8 @@ class Modes(PublicMembers, AssessedResult):
             )
             yield information(
                 "unrestrained", abbreviate_names(moved),
-                f"nothing pushes back {abbreviate_names(moved)}: motions of frequency 0",
-                "add a stiffness if they are not meant to move freely",
+                f"no stiffness acts on {abbreviate_names(moved)}: modes of frequency 0",
+                "add a stiffness, unless they are meant to move freely",
             )  # fmt: skip
 
     @cached_property
@@ -212,7 +213,7 @@ class Modes(PublicMembers, AssessedResult):
 
     def _shape(self, k: int) -> NDArray[Any]:
         if isinstance(k, bool) or not isinstance(k, (int, np.integer)) or not 0 <= k < len(self):
-            raise SceneError(f"shape {k!r}: there are {len(self)}, counted from 0")
+            raise SceneError(f"shape {k!r}: expected the index of one of {len(self)} modes, from 0")
         return self.shapes[:, k]
 
     def dominant_coordinates(self, k: int) -> list[str]:
@@ -325,7 +326,7 @@ class Modes(PublicMembers, AssessedResult):
         *,
         which: Sequence[int] | None = None,
         amplitude: float | None = None,
-        title: str = "Natural motions",
+        title: str = "Normal modes",
     ) -> SceneView:
         """Animated mode shapes on one page, written to `path` if given; see `Result.view`.
 
@@ -338,7 +339,7 @@ class Modes(PublicMembers, AssessedResult):
         from .plots.mode_animation import view
 
         if amplitude is not None and not 0 < finite_float("amplitude", amplitude) <= 1:
-            raise SceneError(f"amplitude = {amplitude:g}: expected a part of the size, 0 to 1")
+            raise SceneError(f"amplitude = {amplitude:g}: expected a fraction of the size, 0 to 1")
         if which is None:
             which = np.flatnonzero(self.omega > 0)[:_PANELS].tolist() or None
         which = self._shape_indices(which)

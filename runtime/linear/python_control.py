@@ -42,7 +42,7 @@ def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: 
         b, pushes = np.hstack([b, linear.B_disturbances]), (*pushes, *linear.disturbance_channels)
     if not pushes:
         raise SceneError(
-            'the model has no inputs: name some, as in linearize(inputs=["shoulder.effort"])'
+            'the model has no inputs; give inputs, as in linearize(inputs=["shoulder.effort"])'
         )
     names, c, d = output_matrices(linear, outputs, pushes, b)
     return control.ss(

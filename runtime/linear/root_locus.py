@@ -143,7 +143,7 @@ def trace_modes(
     found = [linear.modes(count, damped) for linear in models]
     width = max(len(one) for one in found)
     if not width:
-        raise SceneError("nothing moves in this scene, so it has no motions to follow")
+        raise SceneError("the scene has no degrees of freedom, so that it has no modes")
     rows = np.full((len(found), width), np.nan + 0j)
     turns = np.full(rows.shape, np.nan)
     order: Integers = np.arange(len(found[0]))
@@ -179,9 +179,9 @@ def _in_frame(
 def _rotating_frame_risk(parameter: str, why: str) -> Risk:
     return Risk(
         "rotating-frame", parameter,
-        f"frequencies are those of the rotating frame, of which critical speeds cannot be read off "
+        f"frequencies refer to the rotating frame and do not show critical speeds "
         f"({why.removeprefix('fixed frame: ')})",
-        'give frame="rotating" if these are what you want, or make the rotor axisymmetric',
+        'give frame="rotating" to accept this, or make the rotor axisymmetric',
     )  # fmt: skip
 
 
@@ -229,12 +229,13 @@ def critical(at: ModelAtValue, parameter: str, low: float, high: float) -> Stabi
     first, last = _modes_at(at, low), _modes_at(at, high)
     if first is None or _most_unstable_mode(first) is not None:
         raise SceneError(
-            f"{parameter} = {low:g}: a motion grows there already; expected a value at which the "
-            "scene is stable"
+            f"{parameter} = {low:g}: expected a value at which the scene is stable, found a "
+            "growing motion"
         )
     if last is not None and _most_unstable_mode(last) is None:
         raise SceneError(
-            f"{parameter} = {high:g}: no motion grows there; expected a value beyond the critical"
+            f"{parameter} = {high:g}: expected a value above the stability limit, found a stable "
+            "scene"
         )
     below, span = first, high - low
     while abs(high - low) > _NEAR * abs(span):
@@ -267,7 +268,7 @@ def _modes_at(at: ModelAtValue, value: float) -> Modes | None:
     except NumericalFailure:
         return None
     if not len(modes):
-        raise SceneError("nothing moves in this scene, so that nothing grows")
+        raise SceneError("the scene has no degrees of freedom, so that it has no stability limit")
     return modes
 
 
@@ -298,8 +299,8 @@ def _lost_equilibrium(parameter: str, high: float, first: Modes, below: Modes) -
     return (
         Risk(
             "no-equilibrium", RUN,
-            f"at {parameter} = {high:g} no equilibrium was found, but no stiffness vanishes before "
-            "that: the value may be where the search failed, not where stability ends",
-            "look at equilibrium() on both sides of the value",
+            f"no equilibrium was found at {parameter} = {high:g}, but no stiffness vanishes below "
+            "it: the search may have failed there, so that this is not the stability limit",
+            "check equilibrium() on both sides of the value",
         ),
     )  # fmt: skip

@@ -66,18 +66,18 @@ def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
             f'controller "{one.name}"',
             f'controller "{one.name}" is left out: its inputs '
             f"({abbreviate_names(list(one.outputs))}) "
-            "stand still at the values of the scene",
+            "are constant, with the values of the scene",
             "close the loop by the inputs of this model",
         )
     for name, why in unavailable_outputs(linear):
         yield information(
             "output-left-out", f'output "{name}"', f"output {name} is not among the outputs: {why}",
-            "name an output that has a linear form",
+            "use an output that has a linear form",
         )  # fmt: skip
     if linear.model.packed_scene.system.has_timed_loads:
         yield information(
             "time-dependent", RUN, f"loads depend on time: linearised at t = {linear.state.t:g} s",
-            "give the time that is meant, t=...",
+            "give the intended time, t=...",
         )  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
             yield information(
                 "stability-unknown", RUN,
                 f"more than {LARGEST} coordinates: not examined for matrices that change along "
-                "the motion or with time", "look at a smaller part of the scene",
+                "the motion or with time", "analyse a smaller part of the scene",
             )  # fmt: skip
         return
     asked = (
@@ -120,8 +120,8 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
         yield Risk(
             "changing-coefficients", RUN,
             "the matrices change along the motion of this state or with time: frequencies and "
-            "growth of one moment are not those of the motion",
-            "take to_fixed_frame(), which has constant matrices where the rotor is isotropic"
+            "growth rates at one time are not those of the motion",
+            "use to_fixed_frame(), which has constant matrices where the rotor is isotropic"
             if find_blades(linear)
             else "simulate the motion, or linearise about a state that keeps its matrices",
         )  # fmt: skip
@@ -132,8 +132,8 @@ def changing_risk(linear: LinearEquations, name: str) -> Risk:
     """Risk of an input column or output row that changes along the motion or with time."""
     return Risk(
         "changing-input", f'input "{name}"',
-        f"{name} changes its effect along the motion of this state or with time: the model has "
-        f"that of t = {linear.state.t:g} s", "take efforts and speeds of hinges, or simulate",
+        f"the effect of {name} changes along the motion of this state or with time: the model uses "
+        f"that at t = {linear.state.t:g} s", "use efforts and speeds of hinges, or simulate",
     )  # fmt: skip
 
 
@@ -142,14 +142,14 @@ def departure_risk(t: float, leaving: Departure, cause: str) -> Risk:
     names = abbreviate_names(leaving.coordinates)
     if leaving.t == t:
         means = (
-            f"the state does not last: {names} accelerate there, so that the model holds beside "
-            "the motion through it, and only for a moment"
+            f"the state is not steady: {names} accelerate, so that the model describes deviations "
+            "from the motion through it, for a short time only"
         )
     else:
-        change = "changes slightly" if leaving.is_small else "does not last"
+        change = "changes slowly" if leaving.is_small else "is not steady"
         means = f"the state of t = {t:g} s {change}: {cause}, {leaving} moves {names}"
     return Risk(
-        "unsteady-state", names, means, "take an equilibrium or a steady motion, or simulate",
+        "unsteady-state", names, means, "use an equilibrium or a steady motion, or simulate",
         abs(leaving.effort), None, leaving.unit, invalidates=not leaving.is_small,
     )  # fmt: skip
 
@@ -160,7 +160,7 @@ def ineffective_input_risks(linear: LinearEquations, effects: Array) -> Iterator
         if len(linear) and not column.any():
             yield information(
                 "input-without-effect", f'input "{name}"', f"input {name} has no effect here",
-                "choose another input or state",
+                "use another input or state",
             )  # fmt: skip
 
 

@@ -210,7 +210,7 @@ class EquilibriumSearch:
             return light.find(q, tolerance, remaining, progress)
         except EquilibriumNotFoundError as failure:
             raise EquilibriumNotFoundError(
-                f"not at rest after {max_steps} steps", failure.residual
+                f"not converged after {max_steps} steps", failure.residual
             ) from None
 
     @staticmethod

@@ -44,7 +44,7 @@ class BatchRun(Record):
     @property
     def certificate(self) -> Certificate:
         """Raise SceneError: runs of a batch have no certificate."""
-        raise SceneError("runs of a batch have no certificate; simulate this one alone")
+        raise SceneError("runs of a batch have no certificate; simulate this run alone")
 
     def default_quantities(self) -> list[Candidate]:
         """Default quantities of a plot."""
@@ -64,10 +64,10 @@ class BatchResult(AssessedResult, BatchData):
         for k in np.flatnonzero(~np.asarray(self.success)).tolist():
             yield Risk(
                 "run-failed", f"run {k}", f"run {k} failed: {self.messages[k]}",
-                "simulate it alone", value=k,
+                "simulate this run alone", value=k,
             )  # fmt: skip
         yield Risk(
-            "unexamined", RUN, "runs of a batch are not examined: their balances and errors are "
+            "unexamined", RUN, "runs of a batch are not checked: their drifts and errors are "
             "unknown", "simulate single runs with certify=True",
         )  # fmt: skip
 
@@ -77,7 +77,7 @@ class BatchResult(AssessedResult, BatchData):
         Raises SceneError for an invalid index, and for models with one-way bodies.
         """
         count = len(self.q)
-        expected = f"the number of one of {count} runs, from 0 on"
+        expected = f"the index of a run, 0 to {count - 1}"
         k = integer("run", k, -count, expected)
         if k >= count:
             raise SceneError(f"run = {k}: expected {expected}")
@@ -87,8 +87,8 @@ class BatchResult(AssessedResult, BatchData):
         rigid = None if expanded is None else expanded.rigidified
         if rigid is not None and rigid.one_way:
             raise SceneError(
-                'bodies of flexibility "one-way" respond to single runs: simulate this one alone, '
-                'or use flexibility = "coupled"'
+                'bodies of flexibility "one-way" respond in single runs only: simulate this run '
+                'alone, or use flexibility = "coupled"'
             )
         count, no_work = int(reached.sum()), np.full(int(reached.sum()), np.nan)
         statistics: dict[str, Any] = dict.fromkeys(Statistics.__dataclass_fields__, 0)
@@ -186,7 +186,7 @@ class BatchResult(AssessedResult, BatchData):
         )
         _reject_absent(names)
         if not run_indices:
-            raise SceneError("there is nothing to plot: no run has a state; see messages")
+            raise SceneError("nothing to plot: no run has a state; see messages")
         if band if band is not None else len(self.q) > _MAX_LINES:
             figure = compose_panels(self._bands(selection, run_indices), title, ax)
         else:
@@ -245,7 +245,7 @@ class BatchResult(AssessedResult, BatchData):
 def _reject_absent(names: Sequence[str]) -> None:
     for name in names:
         if name in _ABSENT_QUANTITIES:
-            raise SceneError(f'"{name}": batches do not integrate it; simulate one alone')
+            raise SceneError(f'"{name}": not integrated in batches; simulate single runs')
 
 
 def _band_traces(t: Array, quantities: Sequence[Quantity]) -> Iterator[Trace]:

@@ -89,10 +89,8 @@ class Certificate(NotebookDisplay):
         and `balance` (relative, of energy and momentum; None for the bound of the run's own
         tolerance or step).
         """
-        given = None if balance is None else finite_float("balance", balance, "a part")
-        return _verdict(
-            self, finite_float("accuracy", accuracy, "rad, or a part of the motion"), given
-        )
+        given = None if balance is None else finite_float("balance", balance, "a number")
+        return _verdict(self, finite_float("accuracy", accuracy, "a number in rad"), given)
 
     @property
     def trusted(self) -> bool:
@@ -159,7 +157,7 @@ class Certificate(NotebookDisplay):
 
     def as_pairs(self, verdict: bool = True, warnings: bool = True) -> list[tuple[str, str]]:
         """Certificate as pairs (name, text)."""
-        not_determined = "not determined: one sample tells of no change; ask for more output times"
+        not_determined = "not determined: the run has only one sample; give more output times"
         rows = [("verdict", str(self.verdict()))] if verdict else []
         rows.append(("run", self.message))
         rows.append(
@@ -201,21 +199,23 @@ def _verdict(c: Certificate, accuracy: float, balance: float | None) -> Verdict:
     """
     balance_bound = c.step_control.bound if balance is None else balance
     objections = list(c.failures) + [
-        f"{d.name} changes by {d}, more than the {balance_bound:g} asked for"
+        f"{d.name} drifts by {d}, more than the requested bound {balance_bound:g}"
         for d in (c.energy, *c.momentum)
         if balance_bound < d.relative <= c.step_control.bound
     ]
     missing = []
     if c.sample_count < 2:
-        missing.append("one sample tells nothing of energy and momentum")
+        missing.append(
+            "the run has only one sample, so that energy and momentum cannot be compared"
+        )
     if c.error is not None:
         objections += _uncovered_objections(c.error) + _accuracy_objections(c, accuracy)
     elif c.achieved_error is None:
-        missing.append("no second run has told its error (certify=True)")
+        missing.append("the error was not estimated (use certify=True)")
     objections += c.objections
     bounds = f"errors within {accuracy:g} rad or {accuracy:.3g} of the motion"
     if c.achieved_error is not None:
-        bounds = f"the error of {c.achieved_error.quantity} as asked for"
+        bounds = f"error of {c.achieved_error.quantity} as requested"
     return Verdict(
         tuple(dict.fromkeys(objections)),
         tuple(missing),
@@ -228,8 +228,8 @@ def _uncovered_objections(error: ErrorEstimate) -> list[str]:
     if error.covered is None:
         return []
     return [
-        f"the error is not known beyond t = {error.covered:.4g} s, where the second run ended; a "
-        "shorter run, or other tolerances, may let it end"
+        f"the error is unknown after t = {error.covered:.4g} s, where the second run stopped; use "
+        "a shorter run or other tolerances"
     ]
 
 
@@ -243,10 +243,11 @@ def _accuracy_objections(c: Certificate, accuracy: float) -> list[str]:
             motion = (
                 ""
                 if unit == "rad"
-                else f" of {c.error.excursion.get(unit, 0.0):.2g} {unit} of motion"
+                else f", with a motion of {c.error.excursion.get(unit, 0.0):.2g} {unit}"
             )
             objections.append(
-                f"the error of q may be {worst:.1e} {unit or '1'}{motion}{_horizon_note(c.error)}"
+                f"the estimated error of q is {worst:.1e} {unit or '1'}{motion}"
+                f"{_horizon_note(c.error)}"
             )
     return objections
 
@@ -255,7 +256,7 @@ def _horizon_note(error: ErrorEstimate) -> str:
     if error.divergence_time is None:
         return ""
     if error.diverges_at_start:
-        return " (not predictable beyond its start)"
+        return " (not predictable from the start)"
     return f" (predictable until {error.divergence_time:.4g} s)"
 
 
@@ -266,14 +267,14 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
     error = c.error
     rows = [] if c.achieved_error is None else [("error", str(c.achieved_error))]
     if error is None:
-        scope_rows = [("what this covers", c.error_scope)]
-        missing = [("error", "not estimated (certify=True makes a second run)")]
+        scope_rows = [("scope of the error", c.error_scope)]
+        missing = [("error", "not estimated (certify=True estimates it by a second run)")]
         return rows + scope_rows if rows else missing
     is_limited = error.divergence_time is not None and not error.diverges_at_start
     until = f" up to t = {error.divergence_time:.6g} s" if is_limited else ""
     covered_span = "over the whole run"
     if error.covered is not None:
-        covered_span = f"up to t = {error.covered:.6g} s, none beyond"
+        covered_span = f"up to t = {error.covered:.6g} s, unknown afterwards"
         until = until or f" {covered_span}"
     for kind in ("q", "u"):
         whole_run = (
@@ -283,10 +284,10 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
         if values:
             source = f" (from a second run, {error.reference})" if kind == "q" else ""
             rows.append((f"error of {kind}, at most", f"{values}{until}{whole_run}{source}"))
-    rows.append(("what this covers", c.error_scope))
+    rows.append(("scope of the error", c.error_scope))
     if error.divergence_time is not None:
         horizon_text = (
-            f"t = {error.divergence_time:.6g} s: later"
+            f"t = {error.divergence_time:.6g} s: afterwards"
             if is_limited
             else "the start: from the first sample on"
         )
@@ -294,8 +295,7 @@ def _error_rows(c: Certificate) -> list[tuple[str, str]]:
             (
                 "predictable until",
                 f"{horizon_text} the two runs differ by more than {ANGLE:g} rad or {PART:.0%} of "
-                f"the motion, "
-                "and errors have no meaning",
+                "the motion, and error estimates are not valid",
             )
         )
     if error.tenfold_time is not None:
@@ -309,12 +309,12 @@ def _format_errors(errors: dict[str, float]) -> str:
 
 def _error_scope(c: Certificate) -> str:
     """Scope of the error estimate, and what it does not include."""
-    parts = ["the integration in time, not how well the scene stands for what is meant"]
+    parts = ["integration in time only, not the assumptions of the scene"]
     if c.flexible_bodies:
-        parts.append("not the shapes and frames of flexible bodies, whose rows say how far they go")
+        parts.append("not the shape functions and frames of flexible bodies (see their rows)")
     if c.spring_deflection is not None:
         parts.append(
-            "not what springs give by where they stand for constraints: the stiffest, "
-            f"{c.spring_deflection.spring}, by up to {c.spring_deflection.largest:.1e} m"
+            "not the deflection of springs that replace constraints: up to "
+            f"{c.spring_deflection.largest:.1e} m at the stiffest, {c.spring_deflection.spring}"
         )
     return "; ".join(parts)

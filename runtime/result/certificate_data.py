@@ -33,7 +33,7 @@ class Drift:
 
     def __str__(self) -> str:
         if not self.is_known:
-            return f"not determined: no finite {self.unit} in every sample that can be evaluated"
+            return f"not determined: no sample has a finite value in {self.unit}"
         text = f"{self.largest:.1e} {self.unit} of {self.scale:.3g} {self.unit} {self.of_what}"
         return f"{text} ({self.relative:.1e})"
 

@@ -75,13 +75,13 @@ class PivotLoss:
         """Finding that digits are lost; None for a loss up to `MAX_PIVOT_LOSS`."""
         if not self.error > 1e-16 * MAX_PIVOT_LOSS:
             return None
-        refined = f", refined {self.is_refined} times" if self.is_refined else ""
+        refined = f" after {self.is_refined} refinements" if self.is_refined else ""
         return Risk(
             "pivot-loss", f'hinge "{self.hinge}"',
-            f'hinge "{self.hinge}" carries {self.ratio:.0e} times what its motion feels (a heavy '
-            f"body behind light ones): accelerations may err by {self.error:.0e} of their "
-            f"size{refined}", f'sweep = "{self.sweep}" keeps them (explicit methods); or, where '
-            "the root is free, make the heavy body the first one", self.ratio, MAX_PIVOT_LOSS,
+            f'hinge "{self.hinge}": mass ratio {self.ratio:.0e}, heavy body outboard of light '
+            f"ones: relative error of accelerations up to {self.error:.0e}{refined}",
+            f'use sweep = "{self.sweep}" (explicit methods); or, if the root is free, make the '
+            "heavy body the first one", self.ratio, MAX_PIVOT_LOSS,
         )  # fmt: skip
 
 
@@ -102,9 +102,9 @@ class SingularDistance:
     def risk(self) -> Risk | None:
         """Finding on a coordinate singularity or on fixed steps too long near one; else None."""
         approach = (
-            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the angle at which its '
+            f'hinge "{self.hinge}" comes within {self.measure:.0e} of the singularity of its '
+            f"coordinates, at about t = {self.time:.4g} s"
         )
-        approach += f"coordinates fail, at about t = {self.time:.4g} s"
         if self.measure < MIN_SINGULAR_MEASURE:
             return Risk(
                 "gimbal",
@@ -117,8 +117,8 @@ class SingularDistance:
         if self.measure < NEAR_SINGULAR_MEASURE and self.rotation_per_step > MAX_STEP_ANGLE:
             return Risk(
                 "gimbal", f'hinge "{self.hinge}"',
-                f"{approach}, and its angles change there by {self.rotation_per_step:.2g} rad "
-                f"within a step", "use a ball hinge, or a method that chooses its steps",
+                f"{approach}, where its angles change by {self.rotation_per_step:.2g} rad per step",
+                "use a ball hinge, or an adaptive method",
                 self.rotation_per_step, MAX_STEP_ANGLE, "rad",
             )  # fmt: skip
         return None

@@ -116,10 +116,10 @@ def momentum_drifts(result: Record) -> list[Drift]:
     for k, axis in enumerate("xyz"):
         if is_conserved[0, k]:
             change = _max_change(linear[:, k])
-            drifts.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "that moves"))
+            drifts.append(Drift(f"momentum {axis}", "kg*m/s", change, speed, "in motion"))
         if is_conserved[1, k]:
             name, change = f"angular momentum {axis}{pivot_label}", _max_change(angular[:, k])
-            drifts.append(Drift(name, "kg*m2/s", change, scale, "that turns"))
+            drifts.append(Drift(name, "kg*m2/s", change, scale, "in rotation"))
     return drifts
 
 

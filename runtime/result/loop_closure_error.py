@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 #: Name and remedy of the risk of redundant rows that are violated.
 MISFIT_RISK = "nearly-redundant"
 MISFIT_REMEDY = (
-    "make the axes and lengths of the loop agree, with more digits, or model its compliance by a "
-    "bushing or a flexible body"
+    "give the axes and lengths of the loop with more digits, or model its compliance by a bushing "
+    "or a flexible body"
 )
 #: Maximum numbers of checked samples and of named rows.
 _MAX_SAMPLES, _MAX_NAMED_ROWS = 12, 8
@@ -53,11 +53,11 @@ class Closure:
     misfit_loop: str = ""
 
     def __str__(self) -> str:
-        text = f"closed within {self.gap:.1e} (m, rad), slipping by {self.slip:.1e} a second"
-        text += ", which steps on positions leave" if self.position_level else ""
+        text = f"position gap {self.gap:.1e} (m, rad), velocity error {self.slip:.1e} (m/s, rad/s)"
+        text += ", not removed by position-level steps" if self.position_level else ""
         notes = (
-            ("", self.summary), ("repeat others: ", self.redundant_text),
-            ("loads left open: ", self.open_loads),
+            ("", self.summary), ("redundant rows: ", self.redundant_text),
+            ("indeterminate loads: ", self.open_loads),
         )  # fmt: skip
         return "; ".join((text, *(title + words for title, words in notes if words)))
 

@@ -125,16 +125,16 @@ def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory |
 def _risk(
     what: str, name: str, path: _SampledPath, place: float, way: float, longest: float
 ) -> Risk:
-    remedy = f"give max_step = {longest:.1g}, or less"
+    remedy = f"use max_step = {longest:.1g} or less"
     if not path.ranges:
         remedy = (
-            f"write it within where({name} > a, where({name} < b, ..., 0), 0) with a and b close "
-            "around it, where steps end, or give max_step"
+            f"write it as where({name} > a, where({name} < b, ..., 0), 0), with a and b close "
+            "around the feature, so that steps end there, or give max_step"
         )
     return Risk(
         "narrow-load", what,
-        f"{what} does something near {name} = {place:.6g}, narrower than {longest:.2g}, that steps "
-        f"of up to {way:.2g} there have passed over", remedy, way, longest, path.unit,
+        f"{what} has a feature near {name} = {place:.6g}, narrower than {longest:.2g}, that was "
+        f"missed by steps of up to {way:.2g} there", remedy, way, longest, path.unit,
     )  # fmt: skip
 
 

@@ -117,8 +117,8 @@ class Quantities:
         """Force or moment (n, 3) of a hinge."""
         if require_word("hinge", hinge, "the name of a hinge") in self.layout.modal:
             raise SceneError(
-                f'"{hinge}": {kind} is known of hinges; this is a flexible body: ask for the hinge '
-                "that holds it"
+                f'"{hinge}": {kind} exists for hinges only, and this is a flexible body; give its '
+                "inboard hinge"
             )
         hinge_name = self.slots(hinge).name
         return self.observations.loads(hinge_name, 0 if kind == "force" else 3)
@@ -258,7 +258,7 @@ class Quantities:
                 table.scalar(name, unit, long_name, get)
             else:
                 table.vector(name, "the scene", QuantityKind(unit, long_name, XYZ, ()), get)
-        work_label = "work of everything that is not stored"
+        work_label = "work of all non-conservative efforts"
         power = self._sum_getter("power")
         table.scalar("work", "J", work_label, lambda: self.run.work, rates=power)
         scene = self.observations.references.scene

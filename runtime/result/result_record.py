@@ -119,7 +119,7 @@ class Record(FlexibleResults, ABC):
             count = f"{failing.sum()} of {len(sums)} samples cannot be evaluated"
             return f"{count}: {self._observations.failures[0]}"
         finite = np.isfinite(sums).all() and np.isfinite(run.work).all()
-        return "" if finite else "its energies or momenta are beyond what numbers hold"
+        return "" if finite else "its energies or momenta overflow"
 
     @property
     def method_history(self) -> tuple[MethodSegment, ...]:

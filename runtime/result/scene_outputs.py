@@ -72,7 +72,7 @@ def _name_values(name: Name, t: Array, known: QuantityLookup) -> Array:
     quantity = known(name.text)
     if quantity.values.ndim > 1:
         raise SceneError(
-            f'"{name.text}" has {quantity.values.shape[1]} components; take one of them, such as '
+            f'"{name.text}" has {quantity.values.shape[1]} components; use one of them, such as '
             f"{name.text}.{quantity.labels[0]}"
         )
     return quantity.values

@@ -65,18 +65,18 @@ class StepControl:
         if self.step is not None:
             order = min(_ORDER_REDUCTION * self.order, _MAX_DRIFT_ORDER)
             shorter = self.step * (_SAFETY_FACTOR * self.bound / drift) ** (1 / order)
-            return f"take a step below {shorter:.2g} s, or a method that chooses its steps"
+            return f"use a step below {shorter:.2g} s, or an adaptive method"
         drift_ratio = drift / max(self.rtol, self.atol)
         is_expected = (
             drift_ratio <= _SAFETY_FACTOR * _DRIFT_PER_TOLERANCE and self.target_error is None
         )
         reduction = _SAFETY_FACTOR * (MAX_DRIFT if is_expected else DEFAULT_DRIFT) / drift
         if self.target_error:
-            return f"ask for an error below {reduction * self.target_error:.1g}"
+            return f"request an error below {reduction * self.target_error:.1g}"
         if reduction * self.rtol < _MIN_TOLERANCE:
-            return "look for efforts, loads or drives that jump or go to infinity"
+            return "check efforts, loads and drives for jumps and for unbounded values"
         return (
-            f"take rtol = {reduction * self.rtol:.1g} and atol = {reduction * self.atol:.1g}, "
+            f"use rtol = {reduction * self.rtol:.1g} and atol = {reduction * self.atol:.1g}, "
             f"or less"
         )
 

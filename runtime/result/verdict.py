@@ -39,8 +39,8 @@ class Verdict:
             others = f" (and {other_count} more, see below)" if other_count else ""
             return f"NOT trusted: {_first_clause(self.objections[0])}{others}"
         if self.unchecked:
-            return f"not judged: {'; '.join(self.unchecked)}; nothing seen speaks against it"
-        return f"trusted: {self.bounds}, and no model left its range"
+            return f"not verified: {'; '.join(self.unchecked)}; no check objects"
+        return f"trusted: {self.bounds}, all models within their validity range"
 
 
 def _first_clause(sentence: str) -> str:

@@ -66,8 +66,7 @@ def count_refinements(engine: LoopedEngine, q: Array, u: Array, mobility: int) -
     if largest_error > _MAX_ERROR:
         raise NumericalFailure(
             f"accelerations{' of the closed loops' * engine.packed.system.has_loops} have a "
-            f"relative "
-            f"error of {largest_error:.1g} that refinement does not reduce: "
+            f"relative error of {largest_error:.1g} that refinement does not reduce: "
             f"{mass_ratio_text(engine)}"
         )
     return _MAX_REFINEMENTS

@@ -203,7 +203,7 @@ class Assembly:
                 self.calls.engine.packed, MIN_COUNTING_ANGLE
             )
             raise SceneError(
-                f"scene: the speeds given for {self._names()} contradict each other by "
+                f"scene: the speeds given for {self._names()} are inconsistent by "
                 f"{self._amount(row, errors, '.3g', '/s')} {self._location_text(row)}; "
                 f"{cause or 'give fewer or other speeds'}"
             )
@@ -308,9 +308,9 @@ class Assembly:
 
     def _open_loop_message(self, q: Array, missing: Array) -> str:
         row = int(np.abs(missing).argmax())
-        held_text = f" with {self._names()} held" if self.fixed_hinges or self._driven() else ""
+        held_text = f" with {self._names()} fixed" if self.fixed_hinges or self._driven() else ""
         return (
-            f"scene: {self._subject(row)}: the nearest pose leaves "
+            f"scene: {self._subject(row)}: the nearest pose has a gap of "
             f"{self._amount(row, missing, '.7g')}{held_text}; {self._remedy(row, q, missing)}"
         )
 
@@ -340,7 +340,7 @@ class Assembly:
         owner = self.calls.closing_label(row)
         if self.calls.coupling_name(row):
             return f"{owner} cannot be satisfied"
-        return f"the loop that {owner} closes stays open"
+        return f"the loop at {owner} cannot be closed"
 
     def _far_mass(self) -> str:
         """Message part that names a body with an implausibly distant mass centre, or ""."""
@@ -367,8 +367,8 @@ class Assembly:
         )
         if cause:
             return cause
-        hold_text = ", hold or drive less" if self.fixed_hinges or self._driven() else ""
-        return f"correct lengths or axes{hold_text}, or start nearer to a closed state"
+        hold_text = ", fix or drive fewer hinges" if self.fixed_hinges or self._driven() else ""
+        return f"correct lengths or axes{hold_text}, or start closer to a closed configuration"
 
     def _amount(self, row: int, missing: Array, digits: str, per: str = "") -> str:
         amount = f"{abs(missing[row]):{digits}}"

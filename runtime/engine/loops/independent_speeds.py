@@ -105,9 +105,8 @@ class IndependentSpeeds:
         self._check_closed(q)
         names = ", ".join(self._calls.engine.packed.layout.u_name(k) for k in indices)
         raise NumericalFailure(
-            f"the loops leave {motion_count} motions here, which {names or 'no speed'} cannot "
-            f"distinguish: "
-            "a dead centre or a singular pose; use a state near it"
+            f"the mobility is {motion_count} at this state, but {names or 'no speed'} cannot be "
+            "independent speeds: a dead centre or a singular configuration; use a nearby state"
         )
 
     def _check_closed(self, q: Array) -> None:
@@ -117,9 +116,8 @@ class IndependentSpeeds:
         row = int(gaps.argmax())
         if gaps[row] > _MAX_GAP:
             raise NumericalFailure(
-                f"the loop that {self._calls.closing_label(row)} closes is open by "
-                f"{gaps[row]:.3g} at "
-                "this q; use that of model.assemble(q)"
+                f"the loop closed by {self._calls.closing_label(row)} has a position gap of "
+                f"{gaps[row]:.3g} at this q; use the q of model.assemble(q)"
             )
 
     def prescribed_motion(self, q: Array, speed: int) -> Array:

@@ -105,11 +105,10 @@ class LoopAnalysis:
     def summary(self) -> str:
         """Summary of rows, rank and mobility."""
         shapes_text = (
-            f", of them {self.flexible_mobility} of shapes" if self.flexible_mobility else ""
+            f" ({self.flexible_mobility} of shape functions)" if self.flexible_mobility else ""
         )
-        speeds_text = "1 speed" if self.mobility == 1 else f"{self.mobility} speeds"
         count = len(self.constraint_rows)
-        return f"{self.rank} of {count} rows count, {speeds_text} left{shapes_text}"
+        return f"{self.rank} of {count} rows independent, mobility {self.mobility}{shapes_text}"
 
     def redundant_text(self, most: int) -> str:
         """Text of `redundant_rows` for messages, with at most `most` names."""
@@ -301,16 +300,13 @@ class LoopStart:
             if name not in packed.layout.hinges:
                 load_names[name] = (*load_names.get(name, ()), word)
         if rank.is_stuck and not self._has_prescribed_motion:
-            remedy = (
-                "give the flexible bodies there axial shapes too, or let one of their ends slide"
-            )
+            remedy = "give these flexible bodies axial shapes, or let one of their ends slide"
             if not packed.flexible:
-                remedy = "change a length or the place of a hinge slightly, so that they close in"
-                remedy += " more than this pose"
+                remedy = "change a length or the position of a hinge slightly, so that they close "
+                remedy += "in other configurations too"
             closing = _closing_elements_text(names[row][0] for row in sorted(rank.redundant_here))
             raise SceneError(
-                f"scene: {closing} in a pose that no motion leaves, stretched out or folded in "
-                f"line; "
+                f"scene: {closing} in an isolated configuration, stretched out or folded in line; "
                 f"{find_skewed_axis(packed, MIN_COUNTING_ANGLE) or remedy}"
             )
         imposed_rows = [row for row in range(calls.count) if not records.is_rotor_row(row)]
@@ -371,7 +367,7 @@ class LoopStart:
             return ""
         freedom_text = "1 degree of freedom" if mobility == 1 else f"{mobility} degrees of freedom"
         return (
-            f"; hold keeps {count} coordinate{'s' * (count > 1)}, the mechanism has {freedom_text}"
+            f"; hold fixes {count} coordinate{'s' * (count > 1)}, the mechanism has {freedom_text}"
         )
 
     def _check_mobility(self) -> None:
@@ -381,9 +377,8 @@ class LoopStart:
         remedy = find_skewed_axis(self.engine.packed, MIN_COUNTING_ANGLE)
         remedy = remedy or "use a hinge with more coordinates, or replace a hinge by a [[spring]]"
         raise SceneError(
-            f"scene: no degree of freedom is left, and "
-            f"{_closing_elements_text(name for name, _ in self.loops.constraint_rows)}: a "
-            f"structure; {remedy}"
+            "scene: no degrees of freedom (a structure), "
+            f"{_closing_elements_text(name for name, _ in self.loops.constraint_rows)}; {remedy}"
         )
 
     def _check_rounding(self, rows: Sequence[tuple[str, str]]) -> None:
@@ -425,15 +420,16 @@ class LoopStart:
                     )
                 raise SceneError(
                     f"scene: direction {direction} of {calls.closing_label(row)} is redundant, "
-                    f"violated "
-                    f"by {gaps[row]:.3g}: "
+                    f"violated by {gaps[row]:.3g}: "
                     f"{self._shared_drives_note(q) or self._locking_gap_text(float(gaps[row]))}"
                 )
 
     def _locking_gap_text(self, gap: float) -> str:
         """Message part about a gap (m, rad) that no motion closes, with a remedy."""
         remedy = find_skewed_axis_by_gap(self.engine.packed, gap)
-        remedy = remedy or "make axes parallel and points meet, or use a ball or cylindrical hinge"
+        remedy = (
+            remedy or "make axes parallel and points coincide, or use a ball or cylindrical hinge"
+        )
         return f"as a rigid mechanism it would lock; {remedy}"
 
     def _cut_hinge_speed_count(self) -> int:

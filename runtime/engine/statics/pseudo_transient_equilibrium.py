@@ -79,7 +79,7 @@ class PseudoTransientEquilibrium:
         for k in range(self.max_steps):
             if sigma > _MAX_SIGMA_RATIO * first_sigma:
                 raise EquilibriumNotFoundError(
-                    f"after {k} steps no further step leads on", missing_efforts
+                    f"no further progress after {k} steps", missing_efforts
                 )
             step = self._step(missing_efforts, sigma, tolerance)
             step_length = np.inf if step is None else self.stiffness.length(step)
@@ -103,7 +103,9 @@ class PseudoTransientEquilibrium:
             sigma = max(
                 sigma / (_SIGMA_FAST_DECREASE if is_near else _SIGMA_DECREASE), self._min_sigma
             )
-        raise EquilibriumNotFoundError(f"not at rest after {self.max_steps} steps", missing_efforts)
+        raise EquilibriumNotFoundError(
+            f"not converged after {self.max_steps} steps", missing_efforts
+        )
 
     def _step(self, missing: Array, sigma: float, tolerance: float) -> Array | None:
         """Step from the state of the last residual, limited to `_MAX_STEP`.

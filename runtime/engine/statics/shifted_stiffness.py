@@ -68,7 +68,7 @@ class ShiftedStiffness:
             change_size, solution_size = self.length(change), self.length(x)
             if change_size <= _CONVERGED_CHANGE * solution_size:
                 return x
-        raise SolutionIsRounding("the stiffness is rounding here")
+        raise SolutionIsRounding("the stiffness is lost to rounding")
 
     def press(self, x: Array) -> Array:
         """Product K x (nu,)."""

@@ -276,7 +276,7 @@ def _line_search(
         step, work = step / 2, work / 2
     if last_valid is None:
         raise EquilibriumNotFoundError(
-            "no step leads to another state", residual / problem.sizes, problem
+            "no step changes the state", residual / problem.sizes, problem
         )
     return *last_valid, False
 
@@ -334,6 +334,6 @@ def unstable_coordinates(problem: EquilibriumProblem, q: Array) -> tuple[int, ..
         initial=0.0
     ):
         raise EquilibriumNotFoundError(
-            "steps become short far from equilibrium", residual / problem.sizes, problem
+            "steps become too short far from equilibrium", residual / problem.sizes, problem
         )
     return () if _is_asymmetric(stiffness, scale) else moving_indices(values < 0)

@@ -24,8 +24,8 @@ def check_state_at_rest(linear: LinearEquations, structural: Losses, modal: Rati
     """Raise SceneError for structural or modal damping about a moving state."""
     if linear.state.u.any() and (is_requested(structural) or is_requested(modal)):
         raise SceneError(
-            "frequency response: structural and modal damping are those of a scene at rest, and "
-            "this state moves; leave them out, or damp laws and shapes"
+            "frequency response: structural and modal damping require a state at rest, found a "
+            "moving one; leave them out, or define damping in laws and flexible bodies"
         )
 
 
@@ -33,8 +33,8 @@ def reject_modal_damping(modal: Ratios) -> None:
     """Raise SceneError for modal damping ratios together with exact beams."""
     if is_requested(modal):
         raise SceneError(
-            "modal: ratios are those of natural motions by shapes, which exact beams do not have; "
-            "give structural, or leave the shapes"
+            "modal: damping ratios refer to normal modes with shape functions, which exact beams "
+            "do not have; give structural, or leave exact out"
         )
 
 
@@ -43,6 +43,6 @@ def reject_drives(pushes: Sequence[Channel], changed: bool) -> None:
     moved = next((one.name for one in pushes if one.drive_factors), "")
     if changed and moved:
         raise SceneError(
-            f'"{moved}": motions of drives do not go with structural damping and exact beams; '
-            "leave these out, or push by an acceleration of the ground"
+            f'"{moved}": motions of drives cannot be combined with structural damping or exact '
+            "beams; leave these out, or use an acceleration of the ground"
         )

@@ -83,7 +83,7 @@ def exact_modes(
     linear: LinearEquations, count: int, chosen: BeamSelection
 ) -> DynamicStiffnessModes:
     """Normal modes with exact beams; see `Linear.exact_modes`."""
-    count = integer("count", count, 1, "a number of motions, 1 or more")
+    count = integer("count", count, 1, "a number of modes, 1 or more")
     beams = exact_beams(linear, chosen, 0.0).without_damping()
     counter = _Counter(beams)
     omega = counter.natural_frequencies(count)
@@ -106,13 +106,13 @@ class _Counter:
         )  # fmt: skip
         if self.response.tangent.off_tree_count:
             raise SceneError(
-                "exact modes: springs between bodies or loads that follow others reach across the "
-                "tree, where motions are not counted; take them out"
+                "exact modes: springs between bodies and loads that follow other bodies couple "
+                "branches of the tree, for which modes cannot be counted; remove them"
             )
         if linear.operators.skew() > _SYMMETRIC:
             raise SceneError(
-                "exact modes: loads follow the scene, so that its motions are not those of a "
-                "potential and cannot be counted; take them out, or ask for modes of shapes"
+                "exact modes: follower loads have no potential, so that modes cannot be counted; "
+                "remove these loads, or use modes with shape functions"
             )
         self.response.omit_damping()
         self.unit = beams.slowest
@@ -130,22 +130,22 @@ class _Counter:
             if (found >= 0).all():
                 return found + self.beams.clamped_mode_count(omega)
             omega = np.where(found < 0, omega * (1 + beside), omega)
-        raise NumericalFailure(f"exact modes: near {omega[found < 0][0]:.9g} rad/s pivots vanish")
+        raise NumericalFailure(
+            f"exact modes: singular factors near {omega[found < 0][0]:.9g} rad/s"
+        )
 
     def natural_frequencies(self, count: int) -> Array:
         """Natural frequencies omega (count,) of the slowest modes, rad/s."""
         low = _SLOWEST * self.unit
         if (self.response.count_negative(np.array([low**2])) > 0).any():
-            raise SceneError(
-                "exact modes: near this state a motion grows; ask about a state that is stable"
-            )
+            raise SceneError("exact modes: this state is unstable; use a stable state")
         high = self.unit
         while self.below(np.array([high]))[0] < count:
             high *= 2
             if high > _FASTEST * self.unit:
                 raise SceneError(
                     f"count = {count}: the scene has no more than "
-                    f"{self.below(np.array([high]))[0]} natural motions; ask for fewer"
+                    f"{self.below(np.array([high]))[0]} modes; request fewer"
                 )
         wanted = np.arange(1, count + 1)
         lower, upper = np.full(count, low), np.full(count, high)

@@ -100,15 +100,17 @@ def exact_beams(linear: LinearEquations, chosen: BeamSelection, losses: Losses) 
     validity of the solution.
     """
     if linear.constrained_motion is not None:
-        raise SceneError("exact: a loop is closed; the solution goes along trees alone")
+        raise SceneError(
+            "exact: expected a tree, found closed loops; open them, or use shape functions"
+        )
     if linear.state.u.any():
-        raise SceneError("exact: this state moves; the solution is that of beams at rest")
+        raise SceneError("exact: expected a state at rest, found a moving one; use shape functions")
     model, names = linear.model, _names(linear.model, chosen)
     gravity = model.scene.gravity
     if any(gravity):
         raise SceneError(
-            f"exact: gravity = {list(gravity)} bends or pulls beams, whose solution is that of "
-            "straight ones without tension; give gravity = [0, 0, 0], or shapes"
+            f"exact: gravity = {list(gravity)} loads the beams, whose exact solution is that of "
+            "straight beams without tension; give gravity = [0, 0, 0], or use shape functions"
         )
     around = BeamEnvironment(model.scene)
     tables = {beam.name: beam for beam in model.scene.beam if beam.name in names}
@@ -134,7 +136,7 @@ def _names(model: CompiledScene, chosen: BeamSelection) -> tuple[str, ...]:
     if isinstance(chosen, str) or not isinstance(chosen, Sequence):
         raise SceneError(f"exact = {chosen!r}: expected True, or a list of names of beams")
     if not chosen:
-        raise SceneError("exact is empty: leave it out, or name some beams")
+        raise SceneError("exact is empty: expected names of beams; give some, or leave it out")
     for name in chosen:
         if name not in flexible:
             raise SceneError(
@@ -149,18 +151,20 @@ def _check_beam(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
     inner = [x for x in places if x not in (0.0, data.length)]
     problem = ""
     if not data.uniform:
-        problem = "has sections that differ; weld uniform beams into one"
+        problem = "is not uniform; divide it into uniform welded beams"
     elif data.rotary:
-        problem = "has rotary inertia, which the solution leaves out; take it out"
+        problem = "has rotary inertia, which the exact solution neglects; remove it"
     elif inner:
-        problem = f"is held or acted on at x = {inner[0]:g} m; weld two beams there"
+        problem = (
+            f"is supported or loaded at x = {inner[0]:g} m; divide it into two welded beams there"
+        )
     elif any(beam.damping.ratio):
         problem = (
-            "has damping by ratios of its shapes, which it no longer has; give "
+            "has modal damping ratios, but no shape functions if exact; give "
             f'damping = {{ stiffness = ... }}, or structural = {{"{beam.name}": ...}}'
         )
     if problem:
-        raise SceneError(f'exact: beam "{beam.name}" {problem}, or leave its shapes')
+        raise SceneError(f'exact: beam "{beam.name}" {problem}, or do not make it exact')
 
 
 def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> LinearEquations:
@@ -243,14 +247,14 @@ def _check_straight(
         )
         if max(bent, start) > _STRAIGHT * tables[name].length:
             raise SceneError(
-                f'exact: beam "{name}" is bent at rest; the solution is that of a straight one; '
-                "take away what bends it, or leave its shapes"
+                f'exact: beam "{name}" is bent at rest, but the exact solution is that of a '
+                "straight beam; remove the load that bends it, or use shape functions"
             )
         elastic = stiffness @ x[slots]
         if np.abs(pulled[slots] - elastic).max() > _STRAIGHT * np.abs(elastic).max():
             raise SceneError(
-                f'exact: beam "{name}" is pulled or pressed at rest, which makes it stiffer or '
-                "softer; take the load away, or leave its shapes"
+                f'exact: beam "{name}" is under tension or compression at rest, which changes '
+                "its stiffness; remove the load, or use shape functions"
             )
 
 
@@ -274,8 +278,8 @@ def reject_distributed(beams: ExactBeams, pushes: Sequence[Channel]) -> None:
     for push in pushes:
         if push.name in GROUND or (push.input >= 0 and loaded):
             raise SceneError(
-                f'"{push.name}" pushes all along beam "{beams.names[0]}", and exact beams know '
-                "pushes at ends alone; name other inputs, such as forces on ends, or take shapes"
+                f'"{push.name}" acts along the whole beam "{beams.names[0]}", but exact beams '
+                "accept loads at their ends only; use forces at ends, or shape functions"
             )
 
 
@@ -292,7 +296,9 @@ def reject_inner_names(beams: ExactBeams, names: Sequence[str]) -> None:
         beam, end = tables[name], rest.partition(".")[0]
         if end in beam.ends and beam.end_x(end) not in (0.0, beam.length):
             raise SceneError(
-                f'"{signal}": exact beams are asked at their root and tip; weld two beams there'
+                f'"{signal}": exact beams have outputs at root and tip only; divide the beam there'
             )
         if end not in beam.ends and end.rstrip("0123456789_rate") in DIRECTIONS:
-            raise SceneError(f'"{signal}": beam "{name}" is exact and has no shapes; ask an end')
+            raise SceneError(
+                f'"{signal}": beam "{name}" is exact and has no modal coordinates; use an end'
+            )

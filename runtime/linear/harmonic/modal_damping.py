@@ -62,21 +62,20 @@ def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
     zeta = one_row("modal", [ratios] if alone else ratios)
     if (zeta < 0).any():
         raise SceneError(
-            f"modal = {zeta.min():g}: expected parts of the critical damping, 0 or more, such as "
-            "0.02"
+            f"modal = {zeta.min():g}: expected damping ratios of 0 or more, such as 0.02"
         )
     if len(zeta) > len(linear):
         raise SceneError(
-            f"modal: {len(zeta)} ratios, but the scene has {len(linear)} natural motions; give one "
+            f"modal: {len(zeta)} ratios, but the scene has {len(linear)} modes; give one "
             "number for all, or fewer"
         )
     if alone:
-        check_dense_size(len(linear), "the matrix of all motions")
+        check_dense_size(len(linear), "the matrix of all modes")
     found = modes(linear, None if alone else len(zeta), False)
     if not found.is_undamped or found.unstable.any():
         raise SceneError(
-            "modal: near this state a motion grows, or loads follow the scene, so that its motions "
-            "are no vibrations to damp; damp laws, or give structural"
+            "modal: damping ratios require undamped vibration modes, but this state is unstable or "
+            "has follower loads; define damping in laws, or give structural"
         )
     rates = 2 * zeta * found.omega
     damped = np.flatnonzero(rates)

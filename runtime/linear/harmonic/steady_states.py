@@ -30,8 +30,8 @@ def reject_rotating_balls(linear: LinearEquations) -> None:
     """Raise SceneError for exact beams about a state with rotating balls: no matrices exist."""
     if linear.rate_matrix is not None:
         raise SceneError(
-            "exact: the state turns a ball, a free or another hinge whose rates go by its "
-            "coordinates; ask about a state at rest, or leave beams their shapes"
+            "exact: a ball, free or similar hinge rotates at this state, so that its rates depend "
+            "on its coordinates; use a state at rest, or shape functions"
         )
 
 
@@ -47,10 +47,9 @@ def check_steady(
         changing += leaving.coordinates
     if changing:
         raise SceneError(
-            "frequency response: the state moves, and along its motion changes "
-            f"{abbreviate_names(changing)}, so that other frequencies answer too; push by "
-            "efforts of hinges and read their coordinates and speeds, in axes that turn along, "
-            "or ask about a state at rest"
+            "frequency response: not constant along the motion of this state: "
+            f"{abbreviate_names(changing)}, so that the response contains other frequencies; use "
+            "efforts, coordinates and speeds of hinges, in rotating axes, or a state at rest"
         )
 
 
@@ -65,9 +64,8 @@ def check_steady_outputs(linear: LinearEquations, shown: Sequence[LinearQuantity
     changing = find_changes(linear, later, (), shown)
     if changing and MATRICES not in changing and find_departure(linear, later) is None:
         raise SceneError(
-            f"outputs: the state moves, and {abbreviate_names(changing)} changes along its "
-            f"motion, so "
-            "that no constant matrix gives it; read coordinates and speeds of hinges"
+            f"outputs: no constant matrix gives {abbreviate_names(changing)}, because it changes "
+            "along the motion of this state; use coordinates and speeds of hinges"
         )
 
 

@@ -131,16 +131,16 @@ class ConstrainedLinearisation:
         """
         if self.motion is not None:
             raise SceneError(
-                f'"{coordinate(self.model, speed)}": motions of drives of closed loops are inputs '
-                "beside a state at rest, and this one moves or does not last; leave them out"
+                f'"{coordinate(self.model, speed)}": drive motions in closed loops can be inputs '
+                "at an equilibrium only, and this state is not one; leave them out"
             )
         freedom = self.model.independent_speeds
         assert freedom is not None
         along = freedom.prescribed_motion(state.q, speed)
         if not np.isfinite(along).all():
             raise SceneError(
-                f'"{coordinate(self.model, speed)}": the loops do not let this drive move at this '
-                "state; take a state beside it, or another input"
+                f'"{coordinate(self.model, speed)}": the loops lock this drive at this state; use '
+                "a nearby state, or another input"
             )
         return np.asarray(along - self.motion_basis @ along[list(self.independent_indices)])
 

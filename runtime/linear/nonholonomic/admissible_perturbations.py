@@ -98,17 +98,17 @@ class RollingMechanism(ConstrainedLinearisation):
 
     def drive_columns(self, *_: object) -> NoReturn:
         raise SceneError(
-            "linear model: motions of drives are no inputs beside a motion with rows of speeds; "
-            "name efforts or forces"
+            "linear model: motions of drives cannot be inputs about a motion with velocity "
+            "constraints; give efforts or forces"
         )
 
 
 def reject_second_order(found: RollingMechanism) -> NoReturn:
     """Raise SceneError for M, C, K and quantities derived from them."""
     raise SceneError(
-        f"linear model: rows of speeds leave {len(found.independent_indices)} positions and "
-        f"{len(found.speed_indices)} speeds here, which have no M, C, K, V and W; take A, B and "
-        "states"
+        "linear model: M, C, K, V and W do not exist with velocity constraints, which leave "
+        f"{len(found.independent_indices)} positions and {len(found.speed_indices)} speeds "
+        "independent; use A, B and states"
     )
 
 

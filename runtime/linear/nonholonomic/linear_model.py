@@ -132,8 +132,8 @@ class NonholonomicLinear(Linear):
         if self.frame == "fixed":
             return self
         raise SceneError(
-            "to_fixed_frame: beside rolling contacts coefficients last in frames that follow the "
-            "motion alone; take the model as it is"
+            "to_fixed_frame: with rolling contacts, coefficients are constant only in frames that "
+            "follow the motion; use the model as it is"
         )
 
     # --- matrices ---------------------------------------------------------------------------------
@@ -225,7 +225,9 @@ class NonholonomicLinear(Linear):
         Raises SceneError for an invalid count, and for `damped` false.
         """
         if damped is not None and not damped:
-            raise SceneError("damped = False: A beside rolling contacts has no parts; leave it out")
+            raise SceneError(
+                "damped = False: with rolling contacts A has no undamped part; omit it"
+            )
         self.check_count(count, len(self.state_names))
         values, vectors = eigenpairs(self.A)
         n, k = len(self), np.arange(len(values))
@@ -256,7 +258,7 @@ class NonholonomicLinear(Linear):
         """
         check_state_at_rest(self, structural, modal)
         if exact is not False:
-            raise SceneError("exact: beside rolling contacts beams have shapes alone; leave it out")
+            raise SceneError("exact: not supported with rolling contacts; leave it out")
         frequencies, pushes = angular_frequencies(omega), select_inputs(self, inputs)
         shown = outputs_of(self, None if outputs is None else some_names("outputs", outputs))
         self._check_steady(pushes, shown)
@@ -273,7 +275,7 @@ class NonholonomicLinear(Linear):
         shifted = 1j * omega * np.eye(len(self.state_names)) - self.A
         if not np.linalg.cond(shifted) < _SINGULAR:
             raise NumericalFailure(
-                f"frequency response: omega = {omega:.9g} rad/s is a resonance without damping; "
+                f"frequency response: omega = {omega:.9g} rad/s is an undamped resonance; "
                 "add damping, or leave this frequency out"
             )
         return np.asarray(np.linalg.solve(shifted, b), dtype=np.complex128)
@@ -293,16 +295,15 @@ class NonholonomicLinear(Linear):
             yield Risk(
                 "unsteady-state",
                 abbreviate_names(leaving),
-                f"the state does not last: {abbreviate_names(leaving)} accelerate there, so that "
-                f"the "
-                "model holds beside the motion through it, and only for a moment",
+                f"the state is not steady: {abbreviate_names(leaving)} accelerate, so that the "
+                "model describes deviations from the motion through it, for a short time only",
                 "linearise at an equilibrium or a steady motion",
             )
         elif self._has_changing_matrix():
             yield Risk(
                 "changing-coefficients", RUN,
-                "the matrices change along the motion of this state: frequencies and growth of one "
-                "moment are not those of the motion",
+                "the matrices change along the motion of this state: frequencies and growth "
+                "rates at one time are not those of the motion",
                 "simulate the motion, or linearise about a state that keeps its matrices",
             )  # fmt: skip
         yield from friction_risks(self)
@@ -374,9 +375,9 @@ class NonholonomicLinear(Linear):
         ]
         if changing:
             raise SceneError(
-                f"frequency response: along the motion changes {abbreviate_names(changing)}, so "
-                f"that "
-                "other frequencies answer too; push and read what keeps its axes, or simulate"
+                f"frequency response: not constant along the motion: {abbreviate_names(changing)}, "
+                "so that the response contains other frequencies; use inputs and outputs with "
+                "constant axes, or simulate"
             )
 
 

@@ -57,9 +57,9 @@ def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
     hinge = layout.hinge_of_speed(left[worst].speed).name
     yield Risk(
         "dry-friction", f'hinge "{hinge}"',
-        "dry friction is left out, and the model holds for larger motions than those at which a "
+        "dry friction is neglected: the model is valid for motions larger than those at which a "
         f"hinge sticks: {'; '.join(listed)}{f'; and {more} more' if more > 0 else ''}",
-        "give friction, an amplitude of speed at which it counts as viscous damping of equal work",
+        "give friction, a speed amplitude at which it is replaced by viscous damping of equal work",
         float(amplitudes[worst]), _SMALL * float(sizes[worst]), _unit(linear, left[worst].speed),
         invalidates=bool(amplitudes[worst] > _SMALL * sizes[worst]),
     )  # fmt: skip
@@ -164,8 +164,8 @@ def _jump_risk(name: str, unit: str, jump: float, least: float) -> Risk:
     unit = "N*m" if unit == "rad" else "N"
     return Risk(
         "dry-friction", name,
-        f"an effort along {name} jumps by {jump:.4g} {unit} with speeds at this state, as of "
-        "dry friction: the model leaves the jump out",
+        f"an effort along {name} jumps by {jump:.4g} {unit} with the speed at this state, as "
+        "with dry friction: the model neglects the jump",
         "give it as law.friction of the hinge, or as a linear damping", jump, least, unit,
     )  # fmt: skip
 
@@ -174,9 +174,9 @@ def _saturated_risk(name: str, ways: IndependentMotions, k: int, part: float) ->
     """Risk of damping that saturates above low speeds."""
     return Risk(
         "dry-friction", name,
-        f"damping of {name} is that of speeds near the state alone: at "
-        f"{_FAST * ways.sizes[k]:.3g} {ways.units[k]}/s it is {part:.2g} times as large, as of dry "
-        "friction",
+        f"the damping of {name} is valid for speeds close to the state only: at "
+        f"{_FAST * ways.sizes[k]:.3g} {ways.units[k]}/s it is {part:.2g} times as large, as with "
+        "dry friction",
         "give it as law.friction of the hinge, or as a linear damping", part, _SATURATED,
     )  # fmt: skip
 
@@ -186,7 +186,7 @@ def _sentence(name: str, unit: str, amplitude: float, static: float) -> str:
     effort = f"{static:.4g} {'N*m' if unit == 'rad' else 'N'}"
     hinge = name.rpartition(".")[0]
     if not math.isfinite(amplitude):
-        return f"{hinge} under efforts below {effort}, at any amplitude, for nothing pushes it back"
+        return f"{hinge} under efforts below {effort}, at any amplitude, as no stiffness acts on it"
     return f"{hinge} below an amplitude of {amplitude:.4g} {unit} or efforts of {effort}"
 
 

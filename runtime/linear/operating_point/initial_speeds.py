@@ -48,10 +48,10 @@ def find_start_risks(linear: LinearEquations, most: int) -> Iterator[Risk]:
     )
     yield information(
         "start-at-speed", names,
-        f"the scene starts with speeds ({names}) that last, but this model is that at rest, "
-        "without what they do",
-        "for the motion of the start give its state, linearize(*model.initial_state()), or "
-        "--at-start on the command line",
+        f"the scene starts with steady speeds ({names}), but this model is linearised at rest, "
+        "without their effects",
+        "to linearise about the initial motion give its state, linearize(*model.initial_state()), "
+        "or --at-start on the command line",
     )  # fmt: skip
 
 

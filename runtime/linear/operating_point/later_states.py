@@ -81,9 +81,9 @@ class LaterStates:
         model = self._linear.model
         hinges = dict.fromkeys(model.coordinate_layout.hinge_of_speed(k).name for k in self.driven)
         if hinges:
-            return f"while drives move on (of {abbreviate_names(list(hinges))})"
+            return f"as drives move ({abbreviate_names(list(hinges))})"
         if self._linear.state.u.any():
-            return "while the motion goes on"
+            return "as the motion continues"
         return "as loads or drives change with time"
 
     def _phases(self) -> list[float]:

@@ -54,8 +54,8 @@ def formula(
     for one, slope in expression_derivatives(of, numbers.__getitem__).items():
         if not math.isfinite(slope):
             raise SceneError(
-                f'"{of.text}" has no slope by {one.text} at the state, where that is '
-                f"{numbers[one]:.6g}"
+                f'"{of.text}" has no finite derivative with respect to {one.text} at this state, '
+                f"{one.text} = {numbers[one]:.6g}"
             )
         parts += scale_parts(seen[one].parts, slope)
         through += [(given, slope * x) for given, x in seen[one].feedthrough]

@@ -68,9 +68,9 @@ class QuantityLookup:
             outputs = (one.name for one in self._model.scene.output)
             raise SceneError(
                 f'"{name}": expected a coordinate such as "{coordinates[0]}", its rate, a motion '
-                'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", what a spring '
-                f"does, or an output of the "
-                f"scene{did_you_mean(name, (*outputs, *self.known_names()))}"
+                'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", a quantity '
+                "of a spring, or an output of the scene"
+                f"{did_you_mean(name, (*outputs, *self.known_names()))}"
             )
         return found
 
@@ -182,8 +182,8 @@ class QuantityLookup:
     def _check_at_rest(self, name: str, order: int) -> None:
         if order and self._state.u.any():
             raise SceneError(
-                f'"{name}": the state moves, so that places change what speeds of ends are; ask '
-                "for coordinates, their rates or positions there"
+                f'"{name}": at a moving state velocities of ends depend on the configuration; use '
+                "coordinates, their rates or positions"
             )
 
     # --- springs ----------------------------------------------------------------------------------
@@ -202,8 +202,8 @@ class QuantityLookup:
             )
         if spring.type != "spring":
             raise SceneError(
-                f'"{name}": its law is that of a force element "{spring.type}", whose slopes are '
-                f"not known here; ask for {spring.name}.length"
+                f'"{name}": the law of force element type "{spring.type}" has no derivatives '
+                f"here; use {spring.name}.length"
             )
         return self._effort(name, spring.law, number)
 

@@ -40,7 +40,7 @@ def write(made: Any, path: str | Path | None) -> None:
 def require_columns(values: NDArray[Any]) -> None:
     """Raise SceneError if `values` has no column to draw."""
     if not values.shape[1]:
-        raise SceneError("nothing moves in this scene, so that there is nothing to draw")
+        raise SceneError("nothing to draw: the scene has no degrees of freedom")
 
 
 def finish_axes(*axes: Any) -> None:

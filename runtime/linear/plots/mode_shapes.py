@@ -59,12 +59,12 @@ def shapes(
 def eigenvalue_text(value: complex) -> str:
     """Text of frequency and damping ratio, or of growth rate, for an eigenvalue, 1/s."""
     if value == 0:
-        return "0 Hz, moves freely"
+        return "0 Hz, unrestrained"
     if value.imag == 0:
-        return f"{'grows' if value.real > 0 else 'decays'} with {abs(value.real):.4g} 1/s"
+        return f"{'growth' if value.real > 0 else 'decay'} rate {abs(value.real):.4g} 1/s"
     text = f"{value.imag / (2 * np.pi):.4g} Hz"
     if value.real > 0:
-        return f"{text}, grows with {value.real:.3g} 1/s"
+        return f"{text}, growth rate {value.real:.3g} 1/s"
     return text + (f", damping {-value.real / abs(value):.2%}" if value.real else "")
 
 
@@ -74,7 +74,7 @@ def _panel(axis: Any, rest: Outline, moved: Outline) -> None:
     _draw(axis, moved, (across, up), _BLUE, "-", 1.6)
     axis.plot(rest.ground[:, across], rest.ground[:, up], "^", color="0.2", ms=6, zorder=4)
     if not np.abs(moved.points - rest.points).max(initial=0):
-        axis.text(0.5, 0.03, "turns about its own axis", transform=axis.transAxes, ha="center",
+        axis.text(0.5, 0.03, "rotation about its own axis", transform=axis.transAxes, ha="center",
                   fontsize=8, color="0.4")  # fmt: skip
     axis.set_aspect("equal", adjustable="datalim")
     axis.margins(0.08)

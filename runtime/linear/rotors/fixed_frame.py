@@ -86,7 +86,9 @@ def _later_rotation(linear: LinearEquations, there: LinearEquations, others: Int
     left = np.abs(unit @ found - then).max(axis=0) / np.linalg.norm(then, axis=0)
     if (left > _ALIKE).any():
         names = [linear.coordinate_names[k] for k in others[left > _ALIKE]]
-        raise _no_frame(f"what {abbreviate_names(names)} displaces changes its shape as it turns")
+        raise _no_frame(
+            f"the displacements by {abbreviate_names(names)} change their shape during rotation"
+        )
     return np.asarray(found / size[:, None])
 
 
@@ -104,7 +106,7 @@ def _check_constant_matrices(linear: LinearEquations) -> None:
         wrong = np.abs(one - other) > allowed
         if wrong.any():
             names = [linear.coordinate_names[k] for k in np.flatnonzero(wrong.any(axis=0))]
-            raise _no_frame(f"{_NAMES[name]} of {abbreviate_names(names)} changes as it turns")
+            raise _no_frame(f"{_NAMES[name]} of {abbreviate_names(names)} changes during rotation")
 
 
 _NAMES = {"M": "the inertia", "C": "the damping or gyroscopic load", "K": "the stiffness"}
@@ -116,5 +118,5 @@ def _largest(matrix: Array, scale: Array) -> float:
 
 def _no_frame(why: str) -> SceneError:
     return SceneError(
-        f"fixed frame: the rotor is not axisymmetric, and no three or more blades are equal: {why}"
+        f"fixed frame: the rotor is not axisymmetric and has no three or more equal blades: {why}"
     )

@@ -117,7 +117,8 @@ class ColumnFile:
         path = require_path("result file", path)
         if path.suffix.lower() not in TABLES:
             raise SceneError(
-                f'result file "{path}": columns without their scene go into .csv and .mat files'
+                f'result file "{path}": columns without their scene can be saved as .csv or .mat '
+                "only"
             )
         return write_table(self.t, self.event, self.scalars(), path)
 
@@ -133,7 +134,7 @@ class ColumnFile:
         if name.startswith("_") or name not in self.__dict__.get("lost", ()):
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         raise _NotInColumnsError(
-            f'"{name}" needs the scene of the run, and {self.path} holds its columns alone; save '
+            f'"{name}" needs the scene of the run, but {self.path} contains columns only; save '
             "the result as .nc, or run it again"
         )
 

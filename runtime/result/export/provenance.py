@@ -90,7 +90,7 @@ def file_attributes(result: Record) -> dict[str, Any]:
 def provenance_variables(result: Record) -> dict[str, Variable]:
     """Provenance that is too long for an attribute, or has its own dimension."""
     run = result.trajectory
-    scene = {"long_name": "scene as TOML, defaults filled in"}
+    scene = {"long_name": "scene as TOML, including defaults"}
     event = {"long_name": "-(i + 1) just before, i + 1 just after event i"}
     memory = {"long_name": "memory: releases, turns of ball and free hinges"}
     file_variables: dict[str, Variable] = {
@@ -116,12 +116,12 @@ def provenance_variables(result: Record) -> dict[str, Variable]:
             file_variables[f"start_{name}"] = (
                 (dimension,),
                 values,
-                {"long_name": f"{name} at the beginning"},
+                {"long_name": f"initial {name}"},
             )
     file_variables |= _error_variables(result.certificate.error)
     if run.settings.output_times is not None:
         times = np.array(run.settings.output_times)
-        description = {"units": "s", "long_name": "output times asked for"}
+        description = {"units": "s", "long_name": "requested output times"}
         file_variables["output_times"] = (("output_time",), times, description)
     return file_variables
 
@@ -130,7 +130,7 @@ def _error_variables(error: ErrorEstimate | None) -> dict[str, Variable]:
     """Estimated error over time, one column per unit."""
     if error is None:
         return {}
-    long_name = "times that both runs reached"
+    long_name = "times of both runs"
     result: dict[str, Variable] = {
         "error_t": (("error_time",), error.t, {"units": "s", "long_name": long_name})
     }

@@ -77,7 +77,7 @@ def _attributes(unit: str, long_name: str) -> dict[str, str]:
 
 def _common_unit(units: list[str]) -> str:
     """Unit of an array whose columns may have different units."""
-    return (units[0] or "1") if len(set(units)) == 1 else "see the units beside the labels"
+    return (units[0] or "1") if len(set(units)) == 1 else "see the units of the labels"
 
 
 def _dimension_labels(result: Record) -> dict[str, Variable]:

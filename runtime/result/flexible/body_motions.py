@@ -44,9 +44,9 @@ class FlexibleBodies:
             hint_text = (
                 f"the flexible ones are {flexible_names}"
                 if flexible_names
-                else "the scene has no flexible one"
+                else "the scene has none"
             )
-            raise SceneError(f'"{name}": {what} is known of flexible bodies only; {hint_text}')
+            raise SceneError(f'"{name}": {what} exists for flexible bodies only; {hint_text}')
         hint = did_you_mean(name, self.modal_bodies)
         raise SceneError(f'"{name}": there is no such flexible body in the scene{hint}')
 
@@ -79,7 +79,7 @@ class FlexibleBodies:
         """Name of the inboard end of a body."""
         hinge = self._holders.get(name)
         if hinge is None:
-            raise SceneError(f'"{name}": no hinge holds this body')
+            raise SceneError(f'"{name}": this body has no inboard hinge')
         return hinge.outboard_end
 
     @cached_property

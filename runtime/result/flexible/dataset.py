@@ -46,7 +46,7 @@ def variables(result: Record) -> dict[str, Variable]:
         "modal_energy": (
             ("time", "mode"),
             np.concatenate([result.modal_energy(name) for name in bodies], axis=1),
-            _attributes("J", "strain energy of modes and kinetic energy against the frame"),
+            _attributes("J", "strain energy of modes and kinetic energy relative to the frame"),
         ),
         "strain_energy": (
             ("time", "flexible"),
@@ -75,7 +75,7 @@ def _shape_variables(name: str, body: ModalBody) -> dict[str, Variable]:
         second_order = shapes.second_order.field_at(x)[:, :3]
     words = np.array(body.modes, dtype=object)
     return {
-        station: ((station,), x, _attributes("m", f"place along {name}")),
+        station: ((station,), x, _attributes("m", f"position along {name}")),
         modes: ((modes,), words, {"long_name": f"mode of {name}"}),
         f"{name}_phi": (
             (station, "axis", modes),

@@ -44,12 +44,13 @@ BODY_QUANTITIES = {
 #: At the ends of beams, in frame or section axes.
 END_QUANTITIES = {
     "deflection": (QuantityKind("m", "elastic displacement, frame axes", _XYZ, ()), "deflection"),
-    "slope": (QuantityKind("", "slope against the frame along", ("y", "z"), ()), "slope"),
+    "slope": (QuantityKind("", "slope relative to the frame along", ("y", "z"), ()), "slope"),
     "section_force": (
-        QuantityKind("N", "force of the part beyond, section axes", _XYZ, ()), "section_force",
+        QuantityKind("N", "force of the outboard part, section axes", _XYZ, ()), "section_force",
     ),
     "section_moment": (
-        QuantityKind("N*m", "moment of the part beyond, section axes", _XYZ, ()), "section_moment",
+        QuantityKind("N*m", "moment of the outboard part, section axes", _XYZ, ()),
+        "section_moment",
     ),
 }  # fmt: skip
 

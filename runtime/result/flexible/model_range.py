@@ -325,14 +325,14 @@ def rows(found: Sequence[ModelRange]) -> list[tuple[str, str]]:
     tails = [body_range for body_range in found if body_range.tail is not None]
     if tails:
         worst = max(tails, key=lambda body_range: body_range.tail or 0.0)
-        parts.append(("bending missed", f'{worst.tail:.1e} at "{worst.name}"'))
+        parts.append(("missed bending", f'{worst.tail:.1e} at "{worst.name}"'))
     return parts
 
 
 def _body_rows(one: ModelRange) -> list[tuple[str, str]]:
     motion_parts = [
-        f"slope {one.slope:.2g} (the frame errs by up to {one.frame_error:.0e} of the deflection, "
-        f"{one.shortening_error:.0e} of the shortening)"
+        f"slope {one.slope:.2g} (frame error up to {one.frame_error:.0e} of the deflection, "
+        f"{one.shortening_error:.0e} of the foreshortening)"
     ]
     if one.strain is not None:
         motion_parts.append(f"strain {one.strain:.1e}")

@@ -51,9 +51,7 @@ def flexibility_risks(found: Sequence[ModelRange]) -> list[Risk]:
     ):
         kind_risks = [risk for body_range in worst_first if (risk := kind(body_range)) is not None]
         if kind_risks:
-            more = (
-                f" (and {len(kind_risks) - 1} more bodies likewise)" if len(kind_risks) > 1 else ""
-            )
+            more = f" (and {len(kind_risks) - 1} more bodies)" if len(kind_risks) > 1 else ""
             rows.append(replace(kind_risks[0], description=kind_risks[0].description + more))
     return rows
 
@@ -63,7 +61,9 @@ def _stiffening_risk(one: ModelRange) -> Risk | None:
         return None
     stiffening_remedy = 'use flexibility = "coupled"' if one.one_way else "leave stiffening on"
     limitation = (
-        "responds one way, without stiffening" if one.one_way else "has no geometric stiffening"
+        "has a one-way response without stiffening"
+        if one.one_way
+        else "has no geometric stiffening"
     )
     if one.spin_ratio > MAX_SPIN_RATIO:
         remedy = (
@@ -72,14 +72,14 @@ def _stiffening_risk(one: ModelRange) -> Risk | None:
         return Risk(
             "stiffening", f'"{one.name}"',
             f'"{one.name}" {limitation} and spins at {one.spin_ratio:.2g} times its '
-            "first frequency: its deflection grows without bound where a real body stiffens",
+            "first frequency: its deflection grows without bound, while a real body stiffens",
             remedy, one.spin_ratio, MAX_SPIN_RATIO,
         )  # fmt: skip
     if one.load_ratio > MAX_LOAD_RATIO:
         return Risk(
             "stiffening", f'"{one.name}"',
             f'"{one.name}" {limitation}, but its loads change its stiffness by '
-            f"{one.load_ratio:.0%} (gamma): deflections err by about as much",
+            f"{one.load_ratio:.0%} (gamma): relative error of deflections of the same size",
             stiffening_remedy, one.load_ratio, MAX_LOAD_RATIO,
         )  # fmt: skip
     return None
@@ -91,10 +91,9 @@ def _slope_risk(one: ModelRange) -> Risk | None:
     return Risk(
         "slope",
         f'"{one.name}"',
-        f'"{one.name}" bends by a slope of {one.slope:.2g} against its floating frame; beyond '
-        f"{MAX_SLOPE:g} one frame is too little (error up to {one.frame_error:.0%} of the "
-        f"deflection, "
-        f"{min(one.shortening_error, 9.99):.0%} of the shortening)",
+        f'"{one.name}" bends to a slope of {one.slope:.2g} relative to its floating frame; above '
+        f"{MAX_SLOPE:g} one frame is not accurate (error up to {one.frame_error:.0%} of the "
+        f"deflection, {min(one.shortening_error, 9.99):.0%} of the foreshortening)",
         "split the body into welded parts",
         one.slope,
         MAX_SLOPE,
@@ -106,8 +105,8 @@ def _strain_risk(one: ModelRange) -> Risk | None:
         return None
     return Risk(
         "strain", f'"{one.name}"',
-        f'"{one.name}" is strained by {one.strain:.2g}; beyond {MAX_STRAIN:g} the model, which is '
-        "linear in the strain, has no meaning", "check stiffness and loads", one.strain, MAX_STRAIN,
+        f'the strain of "{one.name}" reaches {one.strain:.2g}; above {MAX_STRAIN:g} its model, '
+        "linear in the strain, is not valid", "check stiffness and loads", one.strain, MAX_STRAIN,
     )  # fmt: skip
 
 
@@ -117,8 +116,8 @@ def _rotation_risk(one: ModelRange) -> Risk | None:
     return Risk(
         "turn",
         f'"{one.name}"',
-        f'a section of "{one.name}" turns by {one.turn:.2g} rad against its floating frame; the '
-        "model has no meaning beyond 1.5 rad",
+        f'a section of "{one.name}" rotates by {one.turn:.2g} rad relative to its floating frame; '
+        "the model is not valid above 1.5 rad",
         "split the body into welded parts",
         one.turn,
         MAX_ROTATION,
@@ -136,7 +135,7 @@ def _shape_risk(one: ModelRange) -> Risk | None:
         f'"{one.name}"',
         f'the shapes of "{one.name}" miss {one.tail:.0%} of {"its" if is_beam else "the"} '
         f"{one.tail_of}",
-        f"take more modes, or {basis_remedy}, which carries the loads of its hinges",
+        f"use more modes, or {basis_remedy}, which represents the loads of its hinges",
         one.tail,
         MAX_MISSED_SHARE,
     )
@@ -147,8 +146,8 @@ def _unshaped_risk(one: ModelRange) -> Risk | None:
         return None
     return Risk(
         "shapes", f'"{one.name}"',
-        f'the loads of "{one.name}" would {one.unshaped}, but it has no shapes there and stays '
-        "rigid", f"add {one.unshaped.direction} = 2 to its modes",
+        f'the loads of "{one.name}" would {one.unshaped}, but it has no shape functions for '
+        "this and stays rigid", f"add {one.unshaped.direction} = 2 to its modes",
         one.unshaped.size, one.unshaped.limit, one.unshaped.unit,
     )  # fmt: skip
 
@@ -158,9 +157,9 @@ def _buckling_risk(one: ModelRange) -> Risk | None:
         return None
     return Risk(
         "buckling", f'"{one.name}"',
-        f'its loads take {-one.gamma[0]:.0%} of the stiffness of "{one.name}" (gamma): it is at '
-        "its buckling load, by compression, or sideways by bending moments at work on its twist",
-        "make it stiffer, or its loads less", one.gamma[0], MIN_BUCKLING_RATIO,
+        f'loads reduce the stiffness of "{one.name}" by {-one.gamma[0]:.0%} (gamma): it is at its '
+        "buckling load, by compression or, with twist, by lateral buckling under bending moments",
+        "increase its stiffness, or reduce its loads", one.gamma[0], MIN_BUCKLING_RATIO,
     )  # fmt: skip
 
 
@@ -169,8 +168,9 @@ def _lateral_buckling_risk(one: ModelRange) -> Risk | None:
         return None
     return Risk(
         "buckling", f'"{one.name}"',
-        f'the loads of "{one.name}" reach {one.sideways:.0%} of those that buckle it out of the '
-        "plane of its shapes, which does not show", "give it shapes of y, z and twist",
+        f'the loads of "{one.name}" reach {one.sideways:.0%} of the lateral buckling load, out of '
+        "the plane of its shape functions, which the model does not include",
+        "give it shapes of y, z and twist",
         one.sideways, -MIN_BUCKLING_RATIO,
     )  # fmt: skip
 
@@ -180,7 +180,7 @@ def _shear_risk(one: ModelRange) -> Risk | None:
         return None
     return Risk(
         "shear", f'"{one.name}"',
-        f'shapes by which "{one.name}" bends are too short for a beam without shear: their '
-        f"frequencies err by about {min(one.shear, 1.0):.0%}, by the share that they have",
-        "take an elastic body", one.shear, MAX_SHEAR_ERROR,
+        f'bending shapes of "{one.name}" are too short for a beam without shear: weighted error '
+        f"of their frequencies about {min(one.shear, 1.0):.0%}",
+        "use an elastic body", one.shear, MAX_SHEAR_ERROR,
     )  # fmt: skip

@@ -74,7 +74,7 @@ def _drawn_samples(result: Record) -> NDArray[np.int64]:
     """Indices of the samples to draw; SceneError if there are none."""
     valid_samples = np.flatnonzero(np.isfinite(result.q).all(axis=1))
     if not len(valid_samples):
-        raise SceneError("there are no shapes to draw: the run has no sample; ask for other times")
+        raise SceneError("no shapes to draw: the run has no samples; give other output times")
     return valid_samples[shape_samples(result.t[valid_samples], MAX_SHAPES)]
 
 

@@ -91,7 +91,7 @@ class OneWayResponses:
         return (Risk(
             "one-way-loads", RUN,
             f"one-way response: the loads of the rigid run change too fast for {self.cost.cells} "
-            f"cells (steps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
+            f"cells (jumps of {self.cost.error:.1g} of the largest)", "simulate a shorter time",
             self.cost.error, 10 * LOAD_TOLERANCE,
         ),)  # fmt: skip
 
@@ -213,7 +213,7 @@ def modal_loads(model: CompiledScene, body: ModalBody, observed: Observations) -
 
 def _require_finite(loads: Array, name: str, observed: Observations) -> Array:
     if not np.isfinite(loads).all():
-        reason = next(iter(observed.failures), "they are beyond what numbers hold")
+        reason = next(iter(observed.failures), "overflow")
         raise NumericalFailure(f'one-way response: no loads on the shapes of "{name}": {reason}')
     return loads
 

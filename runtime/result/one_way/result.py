@@ -39,9 +39,9 @@ def _coupling_risk(share: tuple[str, float]) -> Risk:
     name, chi = share
     return Risk(
         "one-way-coupling", f'"{name}"',
-        f'the vibration of "{name}" moves the hinge that carries it: a shape holds {chi:.2g} of '
-        "the inertia there (chi), so that the one-way response may err by "
-        f"{3 * chi / (1 - chi):.1f} of its deflection", 'use flexibility = "coupled"', chi,
+        f'the vibration of "{name}" moves its inboard hinge: a shape has {chi:.2g} of the inertia '
+        "there (chi), so that the relative error of the one-way response may reach "
+        f"{3 * chi / (1 - chi):.1f}", 'use flexibility = "coupled"', chi,
         MAX_UNCOUPLED_SHARE,
     )  # fmt: skip
 
@@ -55,8 +55,8 @@ def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
     return tuple(
         Risk(
             "one-way-release", f'"{name}"',
-            f'hinge "{holders[name]}" lets go of "{name}", whose response stays that of a held '
-            "body", 'use flexibility = "coupled"',
+            f'hinge "{holders[name]}" releases "{name}", whose one-way response remains that of an '
+            "attached body", 'use flexibility = "coupled"',
         )
         for name in rigid.one_way
         if name in holders
@@ -66,8 +66,8 @@ def _release_risks(model: CompiledScene) -> tuple[Risk, ...]:
 def _impact_risk(name: str) -> Risk:
     return Risk(
         "one-way-blow", f'"{name}"',
-        f'the run has blows, of which the response of "{name}" knows nothing: it follows the loads '
-        "between them alone", 'use flexibility = "coupled"',
+        f'the run has impacts, which do not excite the one-way response of "{name}": it follows '
+        "the loads between them only", 'use flexibility = "coupled"',
     )  # fmt: skip
 
 
@@ -104,9 +104,7 @@ class OneWayResult(Result):
         """Modal coordinates of a one-way body with their rates; SceneError for other names."""
         responses = self._one_way.responses
         if body not in responses:
-            raise SceneError(
-                f'"{body}": expected a body that responds one way: {", ".join(responses)}'
-            )
+            raise SceneError(f'"{body}": expected a one-way body: {", ".join(responses)}')
         return responses[body]
 
     def _outside(self) -> tuple[Risk, ...]:

@@ -85,7 +85,7 @@ def draw_runs(
         if not len(run.t):
             prefix = f"{label}: " if len(runs) > 1 else ""
             raise SceneError(
-                f"{prefix}there is nothing to plot: the run has no sample; ask for other times"
+                f"{prefix}nothing to plot: the run has no samples; give other output times"
             )
     shapes, curves = _split_names(runs, wanted)
     quantity_panels = (
@@ -119,7 +119,7 @@ def _compose_figure(
         for panel in made
     ]
     if not pictures:
-        raise SceneError("there is nothing to plot: give the name of a quantity, such as energy")
+        raise SceneError("nothing to plot: give the name of a quantity, such as energy")
     style: Any = _STYLE
     with mpl.rc_context(style):
         if ax is not None:
@@ -153,7 +153,7 @@ def plot_of(
     ).items():
         if other_label in runs:
             raise SceneError(
-                f'beside: "{other_label}" is the label of another run; give each its own'
+                f'beside: "{other_label}" is the label of another run; give each run its own label'
             )
         if not hasattr(other_run, "default_quantities"):
             raise SceneError(

@@ -76,14 +76,14 @@ class PlotSelection:
             if not isinstance(name, str):
                 raise SceneError(
                     f'plot: expected the name of a quantity, such as "energy", found {name!r:.60}; '
-                    "of several names each is an argument of its own"
+                    "give several names as separate arguments"
                 )
         expected = f"one of {', '.join(PLOT_KINDS)}"
         if require_word("kind", self.kind, expected) not in PLOT_KINDS:
             raise SceneError(f"kind = {self.kind!r}: expected {expected}")
         if self.against is not None and self.kind != "time":
             raise SceneError(
-                f'against = "{self.against}" beside kind = "{self.kind}": take one of them'
+                f'against = "{self.against}" and kind = "{self.kind}": give only one of them'
             )
 
 
@@ -219,8 +219,8 @@ def _rate_quantity(quantity: Quantity) -> Quantity:
     rates: Callable[[], Array] | None = quantity.rates
     if rates is None:
         raise SceneError(
-            f'"{quantity.name}": its rate is not known, so it has no phase picture; draw it '
-            "against another quantity"
+            f'"{quantity.name}": a phase plot needs its rate, which is not available; plot '
+            "it against another quantity"
         )
     return replace(quantity, values=np.asarray(rates()), rates=None)
 
@@ -228,7 +228,7 @@ def _rate_quantity(quantity: Quantity) -> Quantity:
 def _require_scalar(quantity: Quantity) -> Quantity:
     if quantity.labels:
         raise SceneError(
-            f'against "{quantity.name}": it has {len(quantity.labels)} components; take one, such '
+            f'against "{quantity.name}": it has {len(quantity.labels)} components; give one, such '
             f"as {quantity.name}.{quantity.labels[0]}"
         )
     return quantity

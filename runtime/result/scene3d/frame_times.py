@@ -28,7 +28,7 @@ _MAX_POSES = 90_000
 _MIN_FRAMES = 24
 #: Points of a trail from one frame to the next.
 _TRAIL_POINTS_PER_FRAME = 4
-_SPEED_EXPECTATION = "seconds of the run that pass in one second, above 0"
+_SPEED_EXPECTATION = "seconds of the run per second of film, above 0"
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class FrameTimes:
         """
         finite = np.flatnonzero(np.isfinite(run.q).all(axis=1))
         if not len(finite):
-            raise SceneError("there is nothing to look at: the run has no sample with numbers")
+            raise SceneError("nothing to draw: the run has no sample with finite coordinates")
         finite_samples, t = finite, run.t[finite]
         duration = float(t[-1] - t[0])
         if duration == 0:

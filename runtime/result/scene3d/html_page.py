@@ -69,14 +69,14 @@ def _start_server() -> Iterator[Any]:
     try:
         import viser
     except ImportError as error:
-        raise missing_package_error("view", "a page to look at", error) from None
+        raise missing_package_error("view", "an animation page", error) from None
     try:
         with _silence_console():
             server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     except OSError as error:
         raise EnvironmentFailure(
-            f"a page to look at: viser cannot listen on this machine ({error}); "
-            "a film needs no such thing: take a name ending in .gif or .png"
+            f"animation page: viser cannot open a port on this machine ({error}); "
+            "write a film or a strip of frames instead: use a name ending in .gif or .png"
         ) from None
     try:
         yield server

@@ -245,7 +245,9 @@ class _SceneBuilder:
     def _path_lines(self) -> Iterator[Line]:
         for reference in self.trails:
             if split_reference(reference)[0] == GROUND:
-                raise SceneError(f'trail of "{reference}": the ground does not move; name an end')
+                raise SceneError(
+                    f'trail of "{reference}": the ground does not move; give an end of a body'
+                )
             way = self.frame_times.path(self.run, reference)
             yield Line(f"trails/{reference}", way[None], _TRAIL_COLOUR, 2.0)
 
@@ -269,7 +271,7 @@ class _SceneBuilder:
             labels = (("x", "m"), ("y", "m"), ("z", "m"))
             centre = self._centre(name, body)
             positions = pose.inertial_points(centre[None])[:, 0]
-            lines = (*text, "its mass centre is at" if body.mass else "its middle is at")
+            lines = (*text, "mass centre at" if body.mass else "centre at")
             yield f"bodies/{name}", ObjectLabel(name, lines, centre, labels, positions)
         for hinge in self.hinges:
             if f"hinges/{hinge.name}" in self.poses:

@@ -73,7 +73,7 @@ def _read_mesh(shape: Shape, content: bytes | None) -> Surface:
         vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
     except Exception as error:  # readers raise many types for invalid files
         raise SceneError(
-            f'shape "{shape.name}": file "{path}" is no mesh that can be read '
+            f'shape "{shape.name}": file "{path}" is not a readable mesh '
             f"({type(error).__name__}: {error})"
         ) from None
     if not len(faces) or len(faces) > _MAX_TRIANGLES or not np.isfinite(vertices).all():

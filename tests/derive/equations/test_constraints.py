@@ -211,7 +211,7 @@ def test_a_length_that_cannot_be_reached() -> None:
     }  # fmt: skip
     with pytest.raises(mstmm.SceneError) as caught:
         compiled(scene)
-    assert 'constraint "rope"' in str(caught.value) and "leaves 0.5 m" in str(caught.value)
+    assert 'constraint "rope"' in str(caught.value) and "has a gap of 0.5 m" in str(caught.value)
 
 
 def test_a_distance_between_points_in_one_place_opens() -> None:

@@ -157,7 +157,7 @@ def test_an_open_loop_is_named_alike() -> None:
     scene, said = rocker_driven().scene, []
     for engine in ("looped", "fused"):
         model = mstmm.compile(scene, engine=engine)
-        with pytest.raises(mstmm.SceneError, match='"closing_pin" at t = 2 s: the loop') as caught:
+        with pytest.raises(mstmm.SceneError, match='"closing_pin" at t = 2 s: its loop') as caught:
             model.simulate(2.1, t_start=2.0)
         said.append(str(caught.value).partition("the nearest")[0])
     assert said[0] == said[1]

@@ -123,15 +123,15 @@ def test_a_scene_at_rest_says_so(tmp_path: Path) -> None:
     made = mstmm.chart(
         hanging, 1.0, methods=METHODS, samples=3, rounds=0, budget=300, state=said.append
     )
-    assert "nothing moves in this scene" in said[-1]
+    assert "the scene has no degrees of freedom" in said[-1]
     assert not made.points
-    with pytest.raises(NumericalFailure, match="nothing moves in this scene"):
+    with pytest.raises(NumericalFailure, match="the scene has no degrees of freedom"):
         made.recommend(1e-3)
     assert made.to_dict()["reference"]["still"] is True
     assert made.recommendations() == []
-    assert build_drawing(made).empty == "nothing moves in this scene"
+    assert build_drawing(made).empty == "the scene has no degrees of freedom"
     assert not made.plot().axes[0].axison
-    assert "Nothing moves in this scene" in made.to_html()
+    assert "The scene has no degrees of freedom" in made.to_html()
     assert not build_drawing(one_level()).empty
     assert len(made.save(tmp_path)) == 3
 

@@ -32,7 +32,7 @@ def test_no_method_passes_a_pole(method: str, options: dict[str, Any]) -> None:
     assert not run.success and not run.trusted
     assert run.last_state[0] == pytest.approx(0.5, abs=1e-9) and run.last_state[0] < 0.5
     if run.status is Status.POLE:
-        assert "hinge \"motor\" ('tan(pi*t)') grows beyond all bounds" in run.message
+        assert "hinge \"motor\" ('tan(pi*t)') is unbounded" in run.message
 
 
 @pytest.mark.parametrize("engine", ["looped", "fused"])
@@ -41,14 +41,14 @@ def test_a_batch_ends_at_a_pole(engine: str) -> None:
     start = np.zeros((3, 1)), np.array([[0.0], [1.0], [2.0]])
     batch = model.simulate_batch(start, t_end=1.0, rtol=1e-3, atol=1e-3, threads=1)
     assert not batch.success.any()
-    assert all("grows beyond all bounds" in message for message in batch.messages)
+    assert all("is unbounded" in message for message in batch.messages)
     assert model.simulate_batch(start, t_end=0.3, threads=1).success.all()
 
 
 def test_a_session_ends_at_a_pole() -> None:
     session = mstmm.compile(motor("tan(pi*t)"), engine="looped").session(method="rk4", step=0.01)
     session.advance(0.3)
-    with pytest.raises(mstmm.errors.NumericalFailure, match="grows beyond all bounds"):
+    with pytest.raises(mstmm.errors.NumericalFailure, match="is unbounded"):
         session.advance(0.3)
 
 

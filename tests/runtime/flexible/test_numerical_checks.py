@@ -86,7 +86,7 @@ def test_a_static_shape_beyond_the_model_is_said() -> None:
 
 def test_a_start_beyond_the_model_is_named() -> None:
     pytest.importorskip("skfem")
-    with pytest.raises(mstmm.NumericalFailure, match=r'"b\.tip" .* section turns by more than 1'):
+    with pytest.raises(mstmm.NumericalFailure, match=r'"b\.tip" .* section rotates by more than 1'):
         soft(initial={"eta": [0.0, 0.32]}).simulate(1e-3)
 
 

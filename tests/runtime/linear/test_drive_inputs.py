@@ -164,14 +164,14 @@ def test_an_input_that_a_drive_follows_is_its_motion() -> None:
     np.testing.assert_array_equal(one.response[:, :, 0], one.response[:, :, 1])
     slide["drive"] = "height/1000*cos(t)"
     going = mstmm.compile(mstmm.Scene(**scene), engine="looped")
-    with pytest.raises(SceneError, match="goes by time besides"):
+    with pytest.raises(SceneError, match="also on time"):
         going.frequency_response([3.0], ["height"], ["mass.x"])
 
 
 @pytest.mark.parametrize(
     ("name", "found"),
-    [("base.displacement", 'the acceleration of a drive, "base.displacement_acceleration"'),
-     ("road", 'acceleration of a drive, "base.displacement_acceleration"'),
+    [("base.displacement", 'of a drive is its acceleration, "base.displacement_acceleration"'),
+     ("road", 'input of a drive is its acceleration, "base.displacement_acceleration"'),
      ("base.effort", 'such as "base.displacement_acceleration"'),
      ("base.displacement_aceleration", 'did you mean "base.displacement_acceleration"')],
 )  # fmt: skip
@@ -181,7 +181,7 @@ def test_what_matrices_do_not_take(name: str, found: str) -> None:
 
 
 def test_structural_damping_is_refused() -> None:
-    with pytest.raises(SceneError, match=r"base\.displacement.*do not go with structural"):
+    with pytest.raises(SceneError, match=r"base\.displacement.*cannot be combined with structural"):
         shaker().linearize().frequency_response([1.0], ["base.displacement"], structural=0.1)
 
 

@@ -215,7 +215,7 @@ def test_equal_masses_beside_each_other_do_not_move_apart() -> None:
 def test_a_resonance_is_refused_whatever_is_read(output: str) -> None:
     scene = masses((2.0, 70.0, 0.0), (3.0, 50.0, 0.0))
     omega = float(compiled(scene).modes().omega[1])
-    with pytest.raises(NumericalFailure, match="is a resonance without damping"):
+    with pytest.raises(NumericalFailure, match="is an undamped resonance"):
         compiled(scene).frequency_response([omega], ["s0.effort"], [output])
 
 
@@ -241,7 +241,9 @@ def test_a_long_run_under_a_sine() -> None:
 
 def test_a_resonance_without_damping_is_named() -> None:
     model = compiled(masses((2.0, 50.0, 0.0)))
-    with pytest.raises(NumericalFailure, match=r'omega = 5 rad/s is a resonance.*hinge "s0"'):
+    with pytest.raises(
+        NumericalFailure, match=r'omega = 5 rad/s is an undamped resonance.*hinge "s0"'
+    ):
         model.frequency_response([1.0, 5.0])
 
 
@@ -269,10 +271,10 @@ def test_what_makes_no_sense_is_refused(arguments: tuple[Any, ...], expected: st
 def test_speeds_of_ends_are_refused_in_motion() -> None:
     linear = compiled(masses((2.0, 50.0, 0.1))).linearize([0.1], [1.0])
     linear.frequency_response([1.0], outputs=["s0.displacement_rate", "m0.x"])
-    with pytest.raises(SceneError, match=r'"m0\.vx": the state moves'):
+    with pytest.raises(SceneError, match=r'"m0\.vx": at a moving state'):
         linear.frequency_response([1.0], outputs=["m0.vx"])
     scene = random_scenes.random_scene(0, 3, types=("ball",), loads=False)
     q, u = random_scenes.random_state(scene, 0)
     turning = mstmm.compile(mstmm.Scene(**scene), engine="looped").linearize(q, u)
-    with pytest.raises(SceneError, match="ask about a state at rest"):
+    with pytest.raises(SceneError, match="or a state at rest"):
         turning.frequency_response([1.0])

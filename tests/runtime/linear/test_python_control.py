@@ -51,7 +51,7 @@ def test_a_regulator_holds_the_nonlinear_pendulum_upright() -> None:
 
 def test_what_makes_no_sense() -> None:
     linear = beam().linearize()
-    with pytest.raises(SceneError, match="has no inputs: name some"):
+    with pytest.raises(SceneError, match="has no inputs; give inputs"):
         linear.to_control()
     with pytest.raises(SceneError, match=r"pin\.angel.*did you mean"):
         beam().linearize(inputs=["pin.effort"]).to_control(["pin.angel"])

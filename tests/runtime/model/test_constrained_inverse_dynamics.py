@@ -168,7 +168,7 @@ def test_a_singular_pose() -> None:
     """Windows that are folded flat can go on more ways than one."""
     model = compiled(four_bars(2, 0.0, 0.0))
     assert model.loops.singular
-    with pytest.raises(mstmm.NumericalFailure, match="a singular pose; use a state near it"):
+    with pytest.raises(mstmm.NumericalFailure, match="singular configuration; use a nearby state"):
         model.mass_matrix(model.initial_state()[0])
 
 

@@ -144,7 +144,7 @@ def test_the_search_is_limited_told_of_and_broken_off() -> None:
     model = mstmm.compile(mstmm.Scene(**chain(arc(12, 0.6))), engine="looped")
     told = list[int]()
     with pytest.raises(
-        NumericalFailure, match=r"at rest after 3 steps.*remaining efforts: .*max_st"
+        NumericalFailure, match=r"not converged after 3 steps.*remaining efforts: .*max_st"
     ):
         model.equilibrium(max_steps=3, progress=lambda number, _: told.append(number))
     assert told == [0, 1, 2]

@@ -99,7 +99,7 @@ def test_a_coordinate_alone_resonates_by_name() -> None:
     linear = model.linearize(inputs=["foot.effort"])
     omega = linear.modes().omega[0] * (1 + 2e-16 * np.arange(3))
     for one in omega:
-        with pytest.raises(NumericalFailure, match="resonance without damping"):
+        with pytest.raises(NumericalFailure, match="undamped resonance"):
             linear.frequency_response([one])
     near = linear.frequency_response([omega[0] * (1 + 1e-6)]).magnitude[0, 0, 0]
     assert 1e3 < near < 1e7

@@ -134,7 +134,7 @@ def test_quantities_of_the_scene_are_known_by_name() -> None:
         ({"of": "rod2.tip.yy + 1"}, '"rod2.tip.yy": there is no such quantity; did you mean'),
         ({"of": "shoulder.angel"}, 'did you mean "shoulder.angle"'),
         ({"of": "q"}, '"q": there is no such quantity'),
-        ({"of": "2*rod2.tip.position"}, "has 3 components; take one of them, such as rod2.tip"),
+        ({"of": "2*rod2.tip.position"}, "has 3 components; use one of them, such as rod2.tip"),
         ({"of": "elbow.q[9]"}, '"elbow.q[9]": there is no such quantity'),
         ({"of": "2*span"}, "found '2*span', which is constant"),
         ({"of": "rod2.tip.y +"}, "of: "),

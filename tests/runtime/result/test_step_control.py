@@ -30,7 +30,7 @@ ONE, TWO = [1.5], [1.5, 0.3]
 def test_the_step_that_is_named_would_do(angles: list[float], method: str, step: float) -> None:
     risk = drift(angles, method=method, step=step)
     assert risk is not None and risk.limit == MAX_DRIFT
-    found = re.search(r"take a step below (\S+) s", risk.remedy)
+    found = re.search(r"use a step below (\S+) s", risk.remedy)
     assert found is not None and 0.005 * step < float(found[1]) < step
     assert drift(angles, method=method, step=float(found[1])) is None
 
@@ -60,11 +60,11 @@ def test_a_wanted_error_is_what_balances_are_held_to() -> None:
     run = mstmm.compile(pins(1, [1.0]), engine="looped").simulate(5.0, error=1e-3)
     assert run.certificate.step_control.bound == 1e-3
     text = run.certificate.step_control.finer(0.01)
-    assert text == "ask for an error below 2e-07"
+    assert text == "request an error below 2e-07"
 
 
 def test_where_no_tolerance_would_do_something_else_is_wrong() -> None:
-    assert "go to infinity" in StepControl(None, 1e-9, 1e-12, 8).finer(0.5)
+    assert "unbounded values" in StepControl(None, 1e-9, 1e-12, 8).finer(0.5)
 
 
 @pytest.mark.parametrize(("stiffer", "told"), [("-100*t*q", True), ("-10*t*q", False)])

@@ -109,8 +109,8 @@ def test_a_second_run_that_fails_tells_only_of_the_time_that_it_covers(
     assert run.success and not run.trusted
     assert error is not None and error.covered is not None and 0.1 < error.covered < 4.0
     assert error.covered == error.t[-1]
-    told = f"up to t = {error.covered:.6g} s, none beyond"
+    told = f"up to t = {error.covered:.6g} s, unknown afterwards"
     assert told in run.certificate.as_text()
-    assert "the error is not known beyond" in str(run.certificate.verdict())
+    assert "the error is unknown after" in str(run.certificate.verdict())
     again = mstmm.load_result(run.save(tmp_path / "run.nc"))
     assert told in again.certificate.as_text() and not again.trusted

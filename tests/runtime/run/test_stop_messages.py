@@ -141,7 +141,7 @@ def bent(**more: Any) -> mstmm.Scene:
 def test_a_start_that_cannot_be_shown_is_refused_by_its_own_reason() -> None:
     """The modes move by themselves, but where the tip is nobody knows: no matter of tolerances."""
     with pytest.raises(
-        mstmm.NumericalFailure, match=r'"blade\.tip" at t = 0 s: a section turns by'
+        mstmm.NumericalFailure, match=r'"blade\.tip" at t = 0 s: a section rotates by'
     ):
         mstmm.compile(bent()).simulate(0.1)
 

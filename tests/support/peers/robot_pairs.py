@@ -120,7 +120,7 @@ def pairs(package: str) -> Iterator[tuple[str, Pair]]:
             try:
                 pair = Pair(path, one, base, rng)
             except SceneError as error:
-                assert base == "free" and "a motion of it is undetermined" in str(error), path
+                assert base == "free" and "its motion is undetermined" in str(error), path
                 continue  # a base without mass, by which Pinocchio divides
             yield f"{path.parent.name}/{path.name} {base}", pair
 

@@ -50,7 +50,7 @@ def test_a_bricard_ring_stays_closed() -> None:
     certificate = result.certificate
     assert certificate.loop_closure is not None
     assert certificate.loop_closure.gap < 1e-12 and certificate.loop_closure.slip < 1e-11
-    assert "loads left open: " in str(certificate)
+    assert "indeterminate loads: " in str(certificate)
     opened = replace(result.trajectory, q=result.q + 1e-3 * np.eye(1, result.q.shape[1]))
     seen = Result(result.model, opened).certificate.loop_closure
     assert seen is not None and seen.gap > 1e-4

@@ -219,7 +219,7 @@ def rocker_driven() -> mstmm.Model:
 
 
 def test_a_start_that_cannot_be_closed_is_refused() -> None:
-    with pytest.raises(mstmm.SceneError, match=r'"closing_pin" at t = 2 s: the loop .* is open'):
+    with pytest.raises(mstmm.SceneError, match=r'"closing_pin" at t = 2 s: its loop is open'):
         rocker_driven().simulate(2.1, t_start=2.0)
 
 

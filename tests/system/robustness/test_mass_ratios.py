@@ -69,4 +69,4 @@ def test_product_fails_for_light_tips_where_the_sweep_does_not(rng: np.random.Ge
 def test_the_certificate_warns_of_a_heavy_tip(mass: float, warns: bool) -> None:
     scene = chain(["pin"] * 4, masses=[1.0, 1.0, 1.0, mass])
     result = mstmm.compile(mstmm.Scene(**scene), sweep="riccati").simulate(1e-3)
-    assert any("heavy body behind light ones" in text for text in result.warnings) == warns
+    assert any("heavy body outboard of light ones" in text for text in result.warnings) == warns

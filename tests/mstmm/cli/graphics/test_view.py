@@ -40,7 +40,7 @@ def test_the_nearest_pose_of_a_loop_that_stays_open(mstmm: Command, folder: Path
     scene = package.Scene(gravity=[0, -9.81, 0], body=bodies, hinge=hinges)
     (folder / "short.toml").write_text(scene.to_toml())
     done = mstmm("view", "short.toml", "-o", "short.html")
-    assert done.code == 2 and "the nearest pose leaves 0.5 m" in done.err
+    assert done.code == 2 and "the nearest pose has a gap of 0.5 m" in done.err
     assert "short.html: the nearest pose" in done.out
     page = (folder / "short.html").read_text()
     assert "<title>short: nearest pose, open by 0.5</title>" in page[:4000]
@@ -138,7 +138,7 @@ def test_curves_that_are_refused(
         ("missing.csv",): "there is no such file",
         ("run.nc", "-o", "a.html"): ".png or .svg or .pdf",
         ("run.nc", "--phase", "--spectrum"): "use only one of them",
-        ("run.nc", "-q", "energy", "--phase"): "its rate is not known",
+        ("run.nc", "-q", "energy", "--phase"): "a phase plot needs its rate",
     }
     for arguments, message in cases.items():
         done = mstmm("plot", *arguments)

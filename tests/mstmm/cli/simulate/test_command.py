@@ -91,9 +91,9 @@ def test_degrees_of_freedom_are_those_that_nobody_imposes(mstmm: Command, folder
 def test_the_verdict_comes_first(mstmm: Command) -> None:
     command = ("simulate", "pendulum.toml", "--t-end", "1", "-o", "run.csv", "--certify")
     assert mstmm(*command).out.startswith("trusted: errors within 0.01 rad")
-    assert mstmm(*command, "--accuracy", "1e-15").out.startswith("NOT trusted: the error of q may")
+    assert mstmm(*command, "--accuracy", "1e-15").out.startswith("NOT trusted: the estimated error")
     unjudged = mstmm(*command[:-1], "--no-certify")
-    assert unjudged.out.startswith("not judged: no second run has told its error (--certify)")
+    assert unjudged.out.startswith("not verified: the error was not estimated (use --certify)")
     assert unjudged.code == 0
     data = json.loads(mstmm(*command, "--accuracy", "1e-15", "--json").out)
     assert data["success"] and not data["trusted"]

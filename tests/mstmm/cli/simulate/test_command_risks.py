@@ -13,7 +13,7 @@ COARSE = ("simulate", "pendulum.toml", "--t-end", "5", "--method", "rk4", "-o", 
 def test_a_doubtful_result_is_saved_and_then_refused(mstmm: Command, folder: Path) -> None:
     done = mstmm(*COARSE, "--step", "0.2", "--on-risk", "refuse")
     assert done.code == 4
-    assert "energy-drift: energy is not kept" in done.err and "run.csv" in done.err
+    assert "energy-drift: energy is not conserved" in done.err and "run.csv" in done.err
     assert (folder / "run.csv").exists() and "wrote run.csv" in done.out
     assert not (folder / "run.csv.checkpoint").exists()
     data = json.loads(mstmm(*COARSE, "--step", "0.2", "--on-risk", "refuse", "--json").out)
@@ -33,7 +33,7 @@ def test_a_run_that_cannot_do_well_is_not_made(mstmm: Command, folder: Path) -> 
 
 
 def test_warnings_are_the_rule_and_silence_can_be_asked_for(mstmm: Command) -> None:
-    assert "energy is not kept" in mstmm(*COARSE, "--step", "0.2").out
+    assert "energy is not conserved" in mstmm(*COARSE, "--step", "0.2").out
     quiet = mstmm(*COARSE, "--step", "0.2", "--on-risk", "ignore")
     assert quiet.code == 0 and "warning" not in quiet.out
     assert quiet.out.startswith("NOT trusted") and "see below" not in quiet.out

@@ -17,7 +17,7 @@ RUN = ("simulate", "pendulum.toml", "--t-end", "2", "-o", "run.nc")
 def test_it_says_what_was_reached(mstmm: Command, folder: Path) -> None:
     done = mstmm(*RUN, "--error", "1e-7")
     assert done.code == 0 and done.err == ""
-    assert done.out.startswith("trusted: the error of all coordinates as asked for")
+    assert done.out.startswith("trusted: error of all coordinates as requested")
     assert "(1.0e-07 requested): by" in done.out
     assert max(map(len, done.out.splitlines())) <= 80
     again = package.load_result(folder / "run.nc").achieved_error

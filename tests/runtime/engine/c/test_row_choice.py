@@ -54,7 +54,7 @@ def test_rounded_numbers_are_named_as_the_cause(digits: int) -> None:
     risks = {risk.name: risk for risk in found.risks}
     gap = risks["nearly-redundant"]
     assert gap.value is not None and 0.1 < gap.value * 10.0**digits < 1e2
-    assert "make the axes and lengths of the loop agree" in gap.remedy
+    assert "give the axes and lengths of the loop with more digits" in gap.remedy
     assert all("rtol" not in risk.remedy for risk in found.risks)
     assert not found.trusted
 

@@ -162,8 +162,8 @@ def test_loads_of_constraints_that_repeat_each_other_are_open() -> None:
 def test_a_certificate_tells_rows_and_loads() -> None:
     model = mstmm.compile(mstmm.Scene(**linkage("closing_pin", laws=False)))
     told = str(model.simulate(0.01).certificate.loop_closure)
-    assert "2 of 5 rows count, 1 speed left; repeat others: z of closing_pin, mx" in told
-    assert "loads left open: fz mx my of crank_pin" in told
+    assert "2 of 5 rows independent, mobility 1; redundant rows: z of closing_pin, mx" in told
+    assert "indeterminate loads: fz mx my of crank_pin" in told
 
 
 @pytest.mark.parametrize("count", [1, 2, 6])

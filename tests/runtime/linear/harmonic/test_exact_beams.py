@@ -259,19 +259,24 @@ BLOWN = {"on": "boom", "force_per_length": [0, "wind", 0]}
         ({}, {}, {"exact": ["bom"]}, '"bom": expected a flexible beam.*"?boom'),
         ({}, {}, {"exact": []}, "exact is empty"),
         ({}, {}, {"exact": "boom"}, "expected True, or a list of names"),
-        ({}, {"gravity": [0, -9.81, 0]}, {}, "bends or pulls beams"),
-        ({"section": PIECES}, {}, {}, 'beam "boom" has sections that differ'),
+        ({}, {"gravity": [0, -9.81, 0]}, {}, "loads the beams"),
+        ({"section": PIECES}, {}, {}, 'beam "boom" is not uniform'),
         ({"rotary_inertia": 1e-3}, {}, {}, 'beam "boom" has rotary inertia'),
-        ({"damping": 0.01}, {}, {}, "damping by ratios of its shapes"),
-        ({"ends": {"mid": 1.0}}, {"spring": [STAY]}, {}, "acted on at x = 1 m"),
-        ({"ends": {"mid": 1.0}}, {}, {"outputs": ["boom.mid.y"]}, "at their root and tip"),
-        ({}, {}, {"outputs": ["boom.y1"]}, "has no shapes"),
+        ({"damping": 0.01}, {}, {}, "has modal damping ratios"),
+        ({"ends": {"mid": 1.0}}, {"spring": [STAY]}, {}, "loaded at x = 1 m"),
+        ({"ends": {"mid": 1.0}}, {}, {"outputs": ["boom.mid.y"]}, "at root and tip only"),
+        ({}, {}, {"outputs": ["boom.y1"]}, "has no modal coordinates"),
         ({}, {"load": [LOAD | {"force": [0, 2, 0]}]}, {}, "bent at rest"),
-        ({}, {"load": [LOAD | {"force": [-3, 0, 0]}]}, {}, "pulled or pressed at rest"),
-        ({}, {}, {"modal": 0.1}, "ratios are those of natural motions by shapes"),
-        ({}, {}, {"inputs": ["ground.acceleration.y"]}, 'pushes all along beam "boom"'),
-        ({}, {"input": [WIND], "load": [BLOWN]}, {"inputs": ["wind"]}, '"wind" pushes all along'),
-        ({}, {}, {"outputs": None}, "all coordinates are shapes of beams; name outputs"),
+        ({}, {"load": [LOAD | {"force": [-3, 0, 0]}]}, {}, "under tension or compression at rest"),
+        ({}, {}, {"modal": 0.1}, "damping ratios refer to normal modes"),
+        ({}, {}, {"inputs": ["ground.acceleration.y"]}, 'acts along the whole beam "boom"'),
+        (
+            {},
+            {"input": [WIND], "load": [BLOWN]},
+            {"inputs": ["wind"]},
+            '"wind" acts along',
+        ),
+        ({}, {}, {"outputs": None}, "all coordinates are those of beam shapes; give outputs"),
     ],
 )
 def test_what_the_solution_does_not_have_is_named(
@@ -292,12 +297,12 @@ def test_motions_that_cannot_be_counted() -> None:
     joined = boom({}, {}, body=[block], outboard=[rail], spring=[across])
     pushed = joined.frequency_response([1.0], ["boom.tip.fy", "rail.effort"], exact=True)
     assert pushed.response.shape == (1, 1, 2)
-    with pytest.raises(SceneError, match="reach across the tree"):
+    with pytest.raises(SceneError, match="couple branches of the tree"):
         joined.dynamic_stiffness_modes(2)
     still = boom({})
     for count in (0, 1.5, True):
-        with pytest.raises(SceneError, match="a number of motions, 1 or more"):
+        with pytest.raises(SceneError, match="a number of modes, 1 or more"):
             still.dynamic_stiffness_modes(count)  # type: ignore[arg-type]
     moving = boom({}, {"type": "pin", "axis": [0, 0, 1]}).linearize(None, [1.0, 0, 0, 0])
-    with pytest.raises(SceneError, match="this state moves"):
+    with pytest.raises(SceneError, match="expected a state at rest"):
         moving.frequency_response([1.0], exact=True)

@@ -181,7 +181,7 @@ def test_a_governor_turns_freely() -> None:
     u = np.zeros(model.nu)
     u[0] = spin
     linear = model.linearize(q, u, inputs=["spin.effort", "swing.effort"])
-    assert not any("does not last" in warning for warning in linear.warnings)
+    assert not any("is not steady" in warning for warning in linear.warnings)
     modes = linear.modes()
     assert modes.omega[-1] ** 2 == pytest.approx(free, rel=1e-9)
     assert worst(linear.C_gyroscopic, linear.C) < 1e-12
@@ -222,4 +222,4 @@ def test_parts_of_a_motion() -> None:
 
 def test_a_drive_that_drags_loops_along_leaves_no_rest() -> None:
     (warning, *_) = turned(1.0, 0.9, 0).linearize().warnings
-    assert warning.startswith("the state does not last: foot0.angle accelerate")
+    assert warning.startswith("the state is not steady: foot0.angle accelerate")

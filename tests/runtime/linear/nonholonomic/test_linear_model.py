@@ -260,7 +260,7 @@ def test_a_disc_that_is_not_round_in_its_inertia_is_told() -> None:
     state = [0, 0, RADIUS, 1, 0, 0, 0], [speed, 0, 0, 0, speed / RADIUS, 0]
     egg = coin(inertia=[0.05, 0.125, 0.075]).linearize(*state, inputs=["fly.effort_wx"])
     assert [risk.name for risk in egg.risks if risk.invalidates] == ["changing-coefficients"]
-    with pytest.raises(SceneError, match="along the motion changes the matrices"):
+    with pytest.raises(SceneError, match="not constant along the motion: the matrices"):
         egg.frequency_response([1.0], outputs=["fly.wy"])
     heavy = coin(center_of_mass=[0.1, 0, 0]).linearize(*state, inputs=[])
     assert [risk.name for risk in heavy.risks if risk.invalidates] == ["unsteady-state"]
@@ -301,13 +301,11 @@ def test_chaplygins_sleigh(speed: float, heading: float) -> None:
 def test_there_are_no_second_order_matrices(tmp_path: Path) -> None:
     linear = coin().linearize(None, [2.0, 0, 0, 0, 4.0, 0], inputs=["fly.effort_wy"])
     for name in ("M", "C", "K", "V", "W", "C_damping", "K_elastic"):
-        with pytest.raises(
-            SceneError, match="5 positions and 3 speeds here, which have no M, C, K"
-        ):
+        with pytest.raises(SceneError, match=r"M, C, K, .* 5 positions and 3 speeds"):
             getattr(linear, name)
     with pytest.raises(SceneError, match="damped = False"):
         linear.modes(damped=False)
-    with pytest.raises(SceneError, match="a number of motions from 1 to 8"):
+    with pytest.raises(SceneError, match="a number of modes from 1 to 8"):
         linear.modes(9)
     data = linear.to_dict()
     assert data["A"] == linear.A.tolist() and "M" not in data and data["trusted"]
@@ -320,5 +318,5 @@ def test_there_are_no_second_order_matrices(tmp_path: Path) -> None:
 def test_a_resonance_is_refused() -> None:
     linear = coin().linearize(None, [2.0, 0, 0, 0, 4.0, 0], inputs=["fly.effort_wy"])
     omega = float(linear.modes().omega[-1])
-    with pytest.raises(NumericalFailure, match="is a resonance without damping"):
+    with pytest.raises(NumericalFailure, match="is an undamped resonance"):
         linear.frequency_response([omega], outputs=["fly.wy"])

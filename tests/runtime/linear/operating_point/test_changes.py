@@ -54,17 +54,19 @@ def test_what_goes_round_is_refused_by_name(drive: str) -> None:
     """A force in axes of the ground on a table that is driven, or turns freely."""
     model = turntable(drive)
     linear = model.linearize([0.0, 0.0], [SPIN, 0.0], inputs=["rail.effort", "slider.force.x"])
-    with pytest.raises(SceneError, match=r"changes slider\.force\.x, so"):
+    with pytest.raises(SceneError, match=r"motion of this state: slider\.force\.x, so"):
         linear.frequency_response([2.0], outputs=["rail.displacement"])
-    with pytest.raises(SceneError, match=r"changes slider\.position\.x, so"):
+    with pytest.raises(SceneError, match=r"motion of this state: slider\.position\.x, so"):
         linear.frequency_response([2.0], ["rail.effort"], ["slider.x"])
-    with pytest.raises(SceneError, match=r"changes ground\.acceleration\.x, .*\.y, so"):
+    with pytest.raises(
+        SceneError, match=r"motion of this state: ground\.acceleration\.x, .*\.y, so"
+    ):
         model.linearize([0.0, 0.0], [SPIN, 0.0]).frequency_response([2.0])
-    with pytest.raises(SceneError, match=r"slider\.position\.x changes along its motion"):
+    with pytest.raises(SceneError, match=r"no constant matrix gives slider\.position\.x"):
         linear.output_matrices(["rail.displacement", "slider.x"])
     assert linear.output_matrices(["rail.displacement"])[0].any()
     assert not linear.trusted
-    assert any("slider.force.x changes its effect" in text for text in linear.warnings)
+    assert any("the effect of slider.force.x changes" in text for text in linear.warnings)
     assert not any("rail.effort" in text for text in linear.warnings)
 
 
@@ -93,7 +95,7 @@ def test_matrices_that_depend_on_the_angle() -> None:
     (text,) = linear.warnings
     assert "the matrices change along the motion" in text
     assert not linear.trusted and not model.modes().trusted
-    with pytest.raises(SceneError, match="changes the matrices, so that other frequencies"):
+    with pytest.raises(SceneError, match="the matrices, so that the response contains other"):
         linear.frequency_response([2.0], outputs=["spring.displacement"])
     assert not model.root_locus("spring.law.stiffness[0]", [200.0, 300.0]).trusted
 
@@ -124,7 +126,7 @@ def rotor(off: float, drive: str = "20*t", gravity: float = 0.0) -> mstmm.Model:
 def test_an_unbalanced_rotor_does_not_rest() -> None:
     """m e W^2 = 40 N along x at t = 0, and 40 cos(W t) afterwards."""
     model = rotor(0.05)
-    with pytest.raises(NumericalFailure, match=r"drives move on \(of spin\), .* N along x\.disp"):
+    with pytest.raises(NumericalFailure, match=r"drives move \(spin\), .* N along x\.disp"):
         model.equilibrium()
     linear = model.linearize()
     (risk,) = linear.risks
@@ -150,10 +152,10 @@ def test_drives_that_do_not_go_on_steadily(drive: str) -> None:
     """They move, accelerate, or stand still at t = 0; the rotor is off its axis."""
     model = rotor(0.05, drive)
     linear = model.linearize()
-    assert not linear.trusted and "does not last" in linear.warnings[0]
+    assert not linear.trusted and "is not steady" in linear.warnings[0]
     if "where" in drive:
         found = model.equilibrium()
-        assert not found.trusted and "does not last" in found.warnings[0]
+        assert not found.trusted and "is not steady" in found.warnings[0]
     else:
         with pytest.raises(NumericalFailure, match="no equilibrium: the state"):
             model.equilibrium()
@@ -247,10 +249,12 @@ def test_closed_loops_that_turn() -> None:
     linear = steady.linearize(inputs=["one.effort"])
     assert linear.trusted and steady.equilibrium().trusted
     assert linear.frequency_response([3.0], outputs=["one.angle"]).trusted
-    with pytest.raises(SceneError, match=r"changes ground\.acceleration\.x, .*\.z, so"):
+    with pytest.raises(
+        SceneError, match=r"motion of this state: ground\.acceleration\.x, .*\.z, so"
+    ):
         steady.frequency_response([3.0])
     mounted = model(True)
-    with pytest.raises(NumericalFailure, match=r"drives move on \(of spin\)"):
+    with pytest.raises(NumericalFailure, match=r"drives move \(spin\)"):
         mounted.equilibrium()
     names = {risk.name for risk in mounted.linearize().risks}
     assert {"unsteady-state", "changing-coefficients"} <= names

@@ -35,7 +35,7 @@ def test_it_is_left_out_at_rest(engine: str) -> None:
     linear = model.linearize()
     np.testing.assert_allclose(linear.modes().eigenvalues, [1j * math.sqrt(WEIGHT / INERTIA)])
     (text,) = linear.warnings
-    assert "dry friction is left out" in text
+    assert "dry friction is neglected" in text
     assert f"pivot below an amplitude of {0.01 / WEIGHT:.4g} rad or efforts of 0.01 N*m" in text
     slope = model.derivatives([0.0], [0.0]).state_matrix[1, 1]
     assert slope == pytest.approx(-0.01 / 1e-3 / INERTIA)  # the exact slope of the law
@@ -154,7 +154,7 @@ def test_in_closed_loops_at_rest_and_in_motion() -> None:
         for name in ("M", "C", "K"):
             wanted = getattr(there, name)
             np.testing.assert_allclose(getattr(here, name), wanted, atol=1e-9, err_msg=name)
-        assert any("dry friction is left out" in text for text in here.warnings)
+        assert any("dry friction is neglected" in text for text in here.warnings)
     assert here.constrained_motion is not None
     ways, places = here.constrained_motion.motion_basis, here.constrained_motion.independent_indices
     given = dry.linearize(q, u, friction=2.0)
@@ -198,7 +198,7 @@ def test_friction_by_an_expression_is_told() -> None:
     told = [law for law, scene in scenes.items() if not of(scene).linearize().trusted]
     assert told == ["-0.01*tanh(u/0.001)"]
     (text,) = of(scenes[told[0]]).linearize().warnings
-    assert "damping of pivot.angle is that of speeds near the state alone" in text
+    assert "damping of pivot.angle is valid for speeds close to the state only" in text
 
 
 def test_friction_that_jumps_is_told() -> None:

@@ -44,7 +44,7 @@ def test_a_spin_that_lasts_is_told() -> None:
     response = model.frequency_response([1.0], ["rail.effort"], ["rail.displacement"])
     assert told(rest) == told(response) == told(model.linearize()) == ["turn.angle_rate"]
     assert not told(spun) and not told(model.linearize([0.0, 0.0])) and rest.trusted
-    (text,) = [text for text in rest.warnings if "starts with speeds" in text]
+    (text,) = [text for text in rest.warnings if "starts with steady speeds" in text]
     assert "linearize(*model.initial_state())" in text and "--at-start" in text
 
 

@@ -81,9 +81,9 @@ def test_a_strip_has_a_panel_for_each_and_a_title(modes: Modes, tmp_path: Path) 
 
 
 def test_refusals(modes: Modes) -> None:
-    with pytest.raises(SceneError, match="amplitude = 2: expected a part of the size"):
+    with pytest.raises(SceneError, match="amplitude = 2: expected a fraction of the size"):
         modes.view(amplitude=2)
-    with pytest.raises(SceneError, match="shape 99: there are 7"):
+    with pytest.raises(SceneError, match="shape 99: expected the index of one of 7"):
         modes.view(which=[99])
     with pytest.raises(SceneError, match="expected a list of 1 to 12 shapes"):
         modes.view(which=3)  # type: ignore[arg-type]

@@ -151,15 +151,15 @@ def test_couplings_that_repeat_others() -> None:
 SPEEDS: Scene = {"speeds": "A.u + B.u"}
 BAD: dict[str, tuple[list[Scene], Scene, Scene, str]] = {
     "values": ([GEAR | {"equals": 0}, {"expression": "2*A.q + 6*B.q", "equals": 1}], {}, {},
-               'coupling ".*" cannot be satisfied: the nearest pose leaves .*; omit it or another'),
+               'coupling ".*" cannot be satisfied: the nearest .* gap .*; omit it or another'),
     "rates": ([SPEEDS, {"speeds": "2*A.u + 2*B.u", "equals": 1}], {}, {},
               'coupling "coupling2" contradicts other constraints by 1 at the start; omit it'),
     "held": ([GEAR | {"equals": 0}], {"initial": {"q": 1.0}, "hold": True}, {"hold": True},
-             'coupling "gear" cannot be satisfied: .* leaves 1 with "A", "B" held'),
+             'coupling "gear" cannot be satisfied: .* gap of 1 with "A", "B" fixed'),
     "given speeds": ([GEAR], {"initial": {"u": 1.0}}, {"initial": {"u": 1.0}},
-                     'given for "A", "B" contradict each other by 4 in coupling "gear"; give'),
+                     'given for "A", "B" are inconsistent by 4 in coupling "gear"; give'),
     "two on one freedom": ([GEAR, {"expression": "A.q + 2*B.q"}], {}, {},
-                           'no degree of freedom is left.* at "gear", "coupling2": a str.*; use'),
+                           'no degrees of freedom .a str.* at "gear", "coupling2"; use'),
     "both driven": ([GEAR], {"drive": "t"}, {"drive": "2*t"},
                     "drives already prescribe A.q and B.q; leave out one drive or"),
 }  # fmt: skip

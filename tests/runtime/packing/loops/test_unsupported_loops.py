@@ -45,7 +45,7 @@ def test_a_structure() -> None:
     scene = cranks()
     scene["hinge"][2]["position"] = [1.5, 0.2, 0.0]
     with pytest.raises(
-        mstmm.SceneError, match=r'no degree of freedom .* at "top.*a structure; use'
+        mstmm.SceneError, match=r'no degrees of freedom .a structure.* at "top.*; use'
     ):
         mstmm.compile(mstmm.Scene(**scene))
 
@@ -57,7 +57,7 @@ def test_a_linkage_that_is_stretched_out(start: tuple[float, ...]) -> None:
     scene["hinge"][3]["position"] = [CRANK + COUPLER + ROCKER, 0, 0]
     for number, angle in zip((0, 1, 3), start, strict=True):
         scene["hinge"][number]["initial"] = {"q": angle}
-    with pytest.raises(mstmm.SceneError, match=r'at "tip" in a pose that no .*; change a length'):
+    with pytest.raises(mstmm.SceneError, match=r'at "tip" in an isolated .*; change a length'):
         mstmm.compile(mstmm.Scene(**scene))
 
 
@@ -80,13 +80,13 @@ def test_a_coupling_leads_a_mechanism_as_a_drive_does(led: dict[str, Any]) -> No
     assert coupled.loops.mobility == driven.loops.mobility == 0
     ends = [one.simulate(0.5, rtol=1e-9).q[-1] for one in (coupled, driven)]
     assert np.abs(ends[0] - ends[1]).max() < 1e-7
-    with pytest.raises(mstmm.SceneError, match='at "tip", "lead": a structure'):
+    with pytest.raises(mstmm.SceneError, match=r'a structure.* at "tip", "lead"'):
         mstmm.compile(mstmm.Scene(**four_bar(), coupling=[coupling | {"equals": 0.0}]))
 
 
 def test_a_value_beyond_all_squares() -> None:
     coupling = {"name": "far", "expression": "foot.q", "equals": 1e300}
-    with warnings.catch_warnings(), pytest.raises(mstmm.SceneError, match=r"leaves 1e\+300"):
+    with warnings.catch_warnings(), pytest.raises(mstmm.SceneError, match=r"a gap of 1e\+300"):
         warnings.simplefilter("error")
         mstmm.compile(mstmm.Scene(**four_bar(), coupling=[coupling]))
 
@@ -136,7 +136,7 @@ def test_a_row_of_a_batch_whose_loops_stay_open(model: mstmm.Model) -> None:
     feet = [GROUND, 9.0, GROUND + 0.05]
     batch = model.simulate_batch(model.initial_state(), {"rocker_pin.position[0]": feet}, t_end=0.1)
     assert batch.success.tolist() == [True, False, True] and batch.q.shape == (3, 1, model.nq)
-    assert 'hinge "closing_pin" closes stays open' in batch.messages[1]
+    assert 'the loop at hinge "closing_pin" cannot be closed' in batch.messages[1]
     assert np.isnan(batch.q[1]).all()
     alone = model.with_parameters({"rocker_pin.position[0]": feet[2]})
     q = alone.simulate(0.1, initial=model.initial_state(), output_times=[0.1]).q

@@ -213,7 +213,7 @@ def test_quantities_by_name(run: Result) -> None:
         (lambda r: r.axial_force("blade", 0, source="shapes"), "no axial modes"),
         (lambda r: r.deflected_shape("blade", points=1), "expected 2 or more"),
         (lambda r: r.body_momentum("blade.tip"), "no such body"),
-        (lambda r: r.force("blade"), "ask for the hinge that holds it"),
+        (lambda r: r.force("blade"), "give its inboard hinge"),
     ],
 )
 def test_refusals_name_what_there_is(run: Result, ask: Any, words: str) -> None:

@@ -63,7 +63,7 @@ def test_an_mp4_without_its_program(
 ) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(EnvironmentFailure, match=r"ffmpeg.*or take a name ending in \.gif"):
+    with pytest.raises(EnvironmentFailure, match=r"ffmpeg.*or use a name ending in \.gif"):
         view.save(tmp_path / "film.mp4")
 
 
