@@ -29,7 +29,7 @@ def option(
     parser: Callable[[Any], Any] | None = None,
     **more: Any,
 ) -> Any:
-    """Option of a command, such as "--step" or "--input/-i", with its value's name and help text."""
+    """Option such as "--step" or "--input/-i", with its value's name and its help text."""
     return typer.Option(*name.split("/"), metavar=metavar, help=description, parser=parser, **more)
 
 

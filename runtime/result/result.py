@@ -52,7 +52,8 @@ class Result(PublicMembers, Record, NotebookDisplay):
         "Flexible bodies": "deflection slope curvature deflected_shape bending_moment axial_force "
         "section_force section_moment strain_energy modal_energy "
         "equivalent_velocity equivalent_angular_velocity",
-        "Quantities by name": "quantity quantity_names default_quantities picture_names outputs table",
+        "Quantities by name": "quantity quantity_names default_quantities "
+        "picture_names outputs table",
         "Verdict": "trusted certificate risks warnings",
         "Output": "plot view report save to_xarray meshes",
     }

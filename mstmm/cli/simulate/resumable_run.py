@@ -37,7 +37,7 @@ def simulate_plan(
             None if plan.times is None else plan.times.until(plan.t_end),
             error=plan.target_error,
             execution=Execution(
-                plan.on_risk, progress, str(plan.checkpoint) if plan.resumable else None, plan.resume
+                plan.on_risk, progress, plan.checkpoint if plan.resumable else None, plan.resume
             ),
         )  # fmt: skip
     except RiskRefused as rejection:

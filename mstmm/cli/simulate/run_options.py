@@ -39,8 +39,8 @@ _CLASSICAL_PREFIX = "dttmm-classical"
 
 _METHOD_HELP = "Integration method, see `mstmm list methods`; auto chooses one."
 _ERROR_HELP = (
-    "Target error of the whole run, in place of tolerances: rad, or relative to the motion; several "
-    "runs may be made."
+    "Target error of the whole run, in place of tolerances: rad, or relative to the motion; "
+    "several runs may be made."
 )
 _OF_HELP = "Quantity to which --error applies, in its unit, such as rod1.tip.position; repeatable."
 _TIMES_HELP = "Output times: a count (201) or an interval in s (0.05, 1s); default: every step."
