@@ -56,12 +56,12 @@ def method_parameters() -> list[Parameter]:
         for item in fields(family):
             if item.name == "name":
                 continue
-            kind = (get_args(hints[item.name]) or (hints[item.name],))[0]
+            kind: Any = (get_args(hints[item.name]) or (hints[item.name],))[0]
             option = typer.Option(
                 f"--{item.name.replace('_', '-')}", metavar=item.metadata["metavar"],
                 help=item.metadata["description"], parser=_PARSERS[kind],
             )  # fmt: skip
-            annotation = Annotated[kind | None, option]
+            annotation: Any = Annotated[kind | None, option]  # type: ignore[valid-type]
             parameters[item.name] = Parameter(
                 item.name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation
             )
