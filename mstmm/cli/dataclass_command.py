@@ -61,7 +61,7 @@ def method_parameters() -> list[Parameter]:
                 f"--{item.name.replace('_', '-')}", metavar=item.metadata["metavar"],
                 help=item.metadata["description"], parser=_PARSERS[kind],
             )  # fmt: skip
-            annotation: Any = Annotated[kind | None, option]  # type: ignore[valid-type]
+            annotation: Any = Annotated[kind | None, option]
             parameters[item.name] = Parameter(
                 item.name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation
             )
