@@ -41,7 +41,7 @@ def forward_kept(hinge: KernelIR) -> KernelIR:
     return graph.kernel(
         "forward_kept", (*hinge.inputs, *more), outputs,
         _nested_values(outputs, nodes | body_nodes),
-        purpose="motion across the hinge and of the body behind it", sources=hinge.sources,
+        purpose="motion across the hinge and of its outboard body", sources=hinge.sources,
     )  # fmt: skip
 
 

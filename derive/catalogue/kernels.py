@@ -260,7 +260,7 @@ ROTOR = "_rotor"
 
 def link_names() -> dict[str, str]:
     """Names of all links -> title; a hinge with one speed also has a link with rotor."""
-    titles = {name: f"rigid body behind the {hinge.title}" for name, hinge in links().items()}
+    titles = {name: f"rigid body outboard of the {hinge.title}" for name, hinge in links().items()}
     single = [name for name, hinge in links().items() if hinge_pose(hinge).nu == 1]
     return titles | {f"{name}{ROTOR}": f"{titles[name]} with a rotor" for name in single}
 

@@ -80,12 +80,12 @@ def _spatial_premises(free: tuple[str, ...]) -> Parts:
     next_moment = m_n - Tilde(next_offset) * q_n
     premises = (
         Equation(
-            "acceleration behind the hinge",
+            "acceleration outboard of the hinge",
             rdd_o,
             _combine_directions(axes, carried_acceleration, translations, alpha, 0),
         ),
         Equation(
-            "angular acceleration behind the hinge",
+            "angular acceleration outboard of the hinge",
             wd_o,
             _combine_directions(axes, wd_i + eta_w, rotations, alpha, len(translations)),
         ),
@@ -123,11 +123,11 @@ def _planar_premises(free: tuple[str, ...]) -> Parts:
     outboard_rotation = Matrix([[alpha[len(translations), 0]]]) if rotations else wd_i + eta_w
     premises = (
         Equation(
-            "acceleration behind the hinge",
+            "acceleration outboard of the hinge",
             rdd_o,
             _combine_directions(axes, carried_acceleration, translations, alpha, 0),
         ),
-        Equation("angular acceleration behind the hinge", wd_o, outboard_rotation),
+        Equation("angular acceleration outboard of the hinge", wd_o, outboard_rotation),
         Equation("moment transmitted", m_o, m_i - Perp(offset).T * q_i, "(5.63)"),
         Equation("force transmitted", q_o, q_i, "(5.65)"),
     )

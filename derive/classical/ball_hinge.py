@@ -35,7 +35,7 @@ def statement() -> HingeStatement:
         notes=(
             "With u_kl the blocks of U: "
             "omegadot_O = -u_32^-1 (u_31 rdd_I + u_33 m_I + u_34 q_I + u_35 - tau_n).",
-            "Behind the last body the free tip takes the place of the next ball (tau_n = 0).",
+            "Outboard of the last body the free tip replaces the next ball (tau_n = 0).",
         ),
     )
 

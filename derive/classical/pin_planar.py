@@ -37,7 +37,7 @@ def statement() -> HingeStatement:
         notes=(
             "With u_kl the blocks of U: "
             "thetadd_O = -(u_31 rdd_I + u_33 m_I + u_34 q_I + u_35 - tau_n) / u_32.",
-            "Behind the last body the free tip takes the place of the next pin (tau_n = 0).",
+            "Outboard of the last body the free tip replaces the next pin (tau_n = 0).",
         ),
     )
 

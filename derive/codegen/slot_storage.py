@@ -431,9 +431,9 @@ def layout_header() -> str:
         + "\n".join(lines)
         + "\n/* Behind them arrays of the speeds, from FIXED + their number times the speeds. */\n"
         + "\n".join(rows)
-        + "\n/* Flexible bodies and sections: arrays behind so many numbers per mode. */\n"
+        + "\n/* Flexible bodies and sections: arrays after a number of values per mode. */\n"
         + "\n".join([*_per_mode_constants(MODE_SLOTS), *_per_mode_constants(SECTION_SLOTS)])
-        + "\n/* A hinge that closes a loop; a coupling; a row. */\n"
+        + "\n/* A cut hinge; a coupling; a row. */\n"
         + "\n".join(
             [
                 *_offset_constants(CLOSURE_SLOTS, "MSTMM_CLOSURE"),
@@ -441,12 +441,12 @@ def layout_header() -> str:
                 *_offset_constants(ROW_SLOTS, "MSTMM_ROW"),
             ]
         )
-        + "\n/* A body in a plane, and what its record gives. */\n"
+        + "\n/* A body in a plane, and the values of its record. */\n"
         + "\n".join(planar_layout())
         + "\n/* cdef end */\n\n"
         + "/* Arrays of a flexible body of n modes, and of one of its sections. */\n"
         + "\n".join([*_offset_macros(MODE_SLOTS, _PAIRS), *_offset_macros(SECTION_SLOTS, "")])
-        + "\n/* What the tangent keeps of a body, of a flexible one, of a section. */\n"
+        + "\n/* Data of the tangent for a body, a flexible body, a section. */\n"
         + "\n".join(
             [
                 *_speed_offset_macros(TANGENT_SLOTS, "MSTMM_TANGENT_NUMBERS"),

@@ -10,7 +10,7 @@ COORDINATES = (
     *(Param(f"q{n}", "", "unit quaternion, outboard to inboard") for n in "wxyz"),
 )
 SPEEDS = (
-    *(Param(f"v{n}", "m/s", "velocity of P against Q, outboard axes") for n in "xyz"),
+    *(Param(f"v{n}", "m/s", "velocity of P relative to Q, outboard axes") for n in "xyz"),
     *(Param(f"w{n}", "rad/s", "angular velocity, outboard axes") for n in "xyz"),
 )
 

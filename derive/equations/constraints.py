@@ -40,11 +40,14 @@ from .loop_closure import OFFSET, ROTATION, VELOCITY_ERROR
 _POINT = sp.Rational(1, 10**24)
 
 _ZERO = sp.ImmutableDenseMatrix([0, 0, 0])
-_GAP = Quantity(symbol("gap", 6), "m", "what the constraint lacks, axes of C")
+_GAP = Quantity(symbol("gap", 6), "m", "position gap of the constraint, axes of C")
 _DRIFT = Quantity(
-    symbol("drift", 6), "", "rate of the slip in the bias motion, axes of C", accumulate=True
+    symbol("drift", 6),
+    "",
+    "rate of the velocity error in the bias motion, axes of C",
+    accumulate=True,
 )
-_LENGTH = Quantity(symbol("p", 1), "m", "the distance that is kept")
+_LENGTH = Quantity(symbol("p", 1), "m", "prescribed distance")
 _HEIGHT = Quantity(symbol("p", 1), "m", "height of the plane over C")
 _DISC = Quantity(
     symbol("p", 5), "m, -",
@@ -93,7 +96,7 @@ def distance() -> Derivation:
     row = [*(direction[i, 0] for i in range(3)), *[sp.Integer(0)] * 3]
     return Derivation(
         "loops",
-        "row of a distance that is kept",
+        "row of a distance constraint",
         (_LENGTH, OFFSET),
         (DIRECTIONS, _GAP),
         (
@@ -113,7 +116,7 @@ def distance_drift() -> Derivation:
     across = (_dot(speed, speed) - rate[0, 0] ** 2) / size[0, 0]
     return Derivation(
         "loops",
-        "rate of the row of a distance",
+        "rate of the row of a distance constraint",
         (OFFSET, VELOCITY_ERROR),
         (_DRIFT,),
         (
@@ -130,7 +133,7 @@ def plane() -> Derivation:
     row = [sp.Integer(i == 2) for i in range(6)]
     return Derivation(
         "loops",
-        "row of a point on a plane",
+        "row of a point-on-plane constraint",
         (_HEIGHT, OFFSET),
         (DIRECTIONS, _GAP),
         (

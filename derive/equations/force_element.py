@@ -73,7 +73,7 @@ def wrench(element: ForceElement) -> Derivation:
         Quantity(vector("F", 3), "N", "force on T at its point, inertial axes"),
         Quantity(vector("M", 3), "N*m", "moment on T, inertial axes"),
         Quantity(vector("V", 1), "J", "stored energy"),
-        Quantity(vector("P", 1), "W", "power of what is not stored"),
+        Quantity(vector("P", 1), "W", "power of non-conservative forces"),
     )
     return Derivation(
         element.name,
@@ -132,8 +132,8 @@ def _deflection_equations(
     ways, pushed = sp.MatrixSymbol("E", n, 6), vector("push", n)
     steps = [
         Equation("deflection", vector("bent", n), deflection),
-        Equation("deflection by rates and turns", ways, sp.Matrix.hstack(*derivatives, *turns)),
-        Equation("push along the deflection", pushed, push),
+        Equation("deflection by rates and rotations", ways, sp.Matrix.hstack(*derivatives, *turns)),
+        Equation("force along the deflection", pushed, push),
     ]
     return steps, _explicit(ways).T * _explicit(pushed)
 

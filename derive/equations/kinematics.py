@@ -89,7 +89,7 @@ def turning() -> Derivation:
     motion = MOTION.symbol
     return Derivation(
         "frames",
-        "turning of a body",
+        "rotation of a body",
         (A, MOTION, delta),
         (
             Quantity(rate, "rad/s", "angular velocity, inertial axes"),
@@ -353,14 +353,14 @@ def driven_effort() -> Derivation:
     )
     return Derivation(
         "frames",
-        "effort that a prescribed acceleration needs",
+        "effort required by a prescribed acceleration",
         (
             Quantity(load, "N, N*m", "effort along the speed of the load at P, H^T f"),
             Quantity(inertia, "kg or kg*m2", "rotor inertia reflected to the speed"),
             Quantity(rate, "", "acceleration"),
-            Quantity(stated, "N, N*m", "effort that is there already"),
+            Quantity(stated, "N, N*m", "effort already applied"),
         ),
-        (Quantity(effort, "N, N*m", "what is missing"),),
+        (Quantity(effort, "N, N*m", "missing effort"),),
         (Equation("tau_d", effort, load + inertia * rate - stated),),
     )
 

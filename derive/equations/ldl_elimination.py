@@ -125,7 +125,7 @@ def recover_factored(nu: int) -> Derivation:
     )
     return Derivation(
         f"generic{nu}",
-        f"accelerations recovered behind a factored hinge with {free_speeds(nu)}",
+        f"accelerations recovered outboard of a factored hinge with {free_speeds(nu)}",
         (R, SHIFT, h, factor, gain, offset, through, PARENT_DELTA),
         (rates, DELTA),
         equations,

@@ -50,7 +50,7 @@ def factor(nu: int) -> Derivation:
     """
     h, factored, gain, _ = _hinge(nu)
     rotor = Quantity(symbol("J", nu), "kg*m2 or kg", "rotor inertia reflected to the speeds")
-    laws = Quantity(symbol("W", nu, nu), "", "change of the efforts of laws, a row a speed")
+    laws = Quantity(symbol("W", nu, nu), "", "change of the efforts of laws, one row per speed")
     push, pivot, below = symbol("U", 6, nu), symbol("D", nu, nu), symbol("Y", nu, 6)
     scaled, reduced = symbol("Z", nu, 6), symbol("S_Q", 6, 6)
     equations: tuple[Equation, ...] = (Equation("S_Q = S", reduced, S.symbol),)
@@ -101,7 +101,9 @@ def _symmetric(matrix: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
 def column_load(nu: int) -> Derivation:
     """Load of one column carried to the parent."""
     h, _, gain, surplus = _hinge(nu)
-    tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
+    tau = Quantity(
+        symbol("tau", nu), "N, N*m", "efforts of the right-hand side on the free coordinates"
+    )
     onward = symbol("e_Q", 6)
     equations: tuple[Equation, ...] = (Equation("e_Q = e", onward, E.symbol),)
     if nu:
@@ -111,7 +113,7 @@ def column_load(nu: int) -> Derivation:
         )
     return Derivation(
         f"generic{nu}",
-        f"load of a column carried across a hinge with {free_speeds(nu)}",
+        f"load of a right-hand side carried across a hinge with {free_speeds(nu)}",
         (R, SHIFT, h, gain, E, tau),
         (surplus, PARENT_E),
         (*equations, Equation("X^T e_Q", PARENT_E.symbol, transport(onward))),
@@ -122,11 +124,13 @@ def column_load(nu: int) -> Derivation:
 def ground_column_load(nu: int) -> Derivation:
     """y of one column at a hinge on the ground."""
     h, _, _, surplus = _hinge(nu)
-    tau = Quantity(symbol("tau", nu), "N, N*m", "the column's efforts on the free coordinates")
+    tau = Quantity(
+        symbol("tau", nu), "N, N*m", "efforts of the right-hand side on the free coordinates"
+    )
     value = tau.symbol - h.symbol.T * E.symbol
     return Derivation(
         f"generic{nu}",
-        f"load of a column felt by a hinge on the ground with {free_speeds(nu)}",
+        f"load of a right-hand side along a hinge on the ground with {free_speeds(nu)}",
         (h, E, tau), (surplus,),
         (Equation("y = tau - H^T e", surplus.symbol, value),), sources=SOURCES,
     )  # fmt: skip
@@ -153,7 +157,7 @@ def column_acceleration(nu: int) -> Derivation:
         equations.append(Equation("deviation of the body", DELTA.symbol, carried))
     return Derivation(
         f"generic{nu}",
-        f"accelerations that answer a column, across a hinge with {free_speeds(nu)}",
+        f"accelerations due to a right-hand side, across a hinge with {free_speeds(nu)}",
         (R, SHIFT, h, factor, gain, surplus, PARENT_DELTA),
         (rates, DELTA),
         tuple(equations),

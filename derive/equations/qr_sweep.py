@@ -54,13 +54,13 @@ SOURCES_QR = (
 )
 
 ROWS = Quantity(symbol("U", 21), "", "upper triangle, row by row: S = U^T U")
-ROW_LOAD = Quantity(symbol("d", 6), "", "load that rows take: f = U^T (U a + d) + e")
-CARRIED_ROWS = Quantity(symbol("V", 21), "", "upper triangle of what is behind the hinge")
-CARRIED_ROW_LOAD = Quantity(symbol("d_V", 6), "", "load that its rows take")
-REMAINING_LOAD = Quantity(symbol("e_Q", 6), "N, N*m", "load that they do not take")
+ROW_LOAD = Quantity(symbol("d", 6), "", "load in the rows: f = U^T (U a + d) + e")
+CARRIED_ROWS = Quantity(symbol("V", 21), "", "upper triangle outboard of the hinge")
+CARRIED_ROW_LOAD = Quantity(symbol("d_V", 6), "", "load in its rows")
+REMAINING_LOAD = Quantity(symbol("e_Q", 6), "N, N*m", "load outside the rows")
 
 PARENT_ROWS = Quantity(symbol("U_P", 21), "", "upper triangle of the parent so far")
-PARENT_ROW_LOAD = Quantity(symbol("d_P", 6), "", "load that its rows take")
+PARENT_ROW_LOAD = Quantity(symbol("d_P", 6), "", "load in its rows")
 
 
 def triangular(entries: sp.MatrixSymbol) -> sp.ImmutableDenseMatrix:
@@ -106,7 +106,7 @@ def factor() -> Derivation:
     matrix = sp.ImmutableDenseMatrix(entries)
     equations.append(Equation("U", ROWS.symbol, _triangle_entries(matrix)))
     return Derivation(
-        "qr", "rows of a body alone", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
+        "qr", "rows of a single body", (S,), (ROWS,), tuple(equations), sources=SOURCES_QR
     )
 
 
@@ -126,7 +126,7 @@ def bias() -> Derivation:
     spin = tilde(w)
     return Derivation(
         "qr",
-        "loads of a rigid body alone by its rows",
+        "loads of a single rigid body by its rows",
         (ROWS, MOTION),
         (ROW_LOAD, E),
         (
@@ -149,17 +149,19 @@ def _split_load() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbo
     for i in range(6):
         remainder_i, equation = _scalar_equation(
             f"left_{i + 1}", E.symbol[i, 0] - sum(u[k, i] * carried[k] for k in range(i)),
-            f"load left for row {i + 1}",
+            f"remaining load for row {i + 1}",
         )  # fmt: skip
         size = sum(u[k, i] ** 2 for k in range(i + 1))
         takes = u[i, i] ** 2 > _MIN_ROW_SHARE**2 * size
         added, adding = _scalar_equation(
             f"taken_{i + 1}",
             sp.Piecewise((remainder_i / u[i, i], takes), (0, True)),
-            f"row {i + 1} takes",
+            f"part of row {i + 1}",
         )
         carried_i, carried_equation = _scalar_equation(
-            f"rest_{i + 1}", sp.Piecewise((0, takes), (remainder_i, True)), f"row {i + 1} leaves"
+            f"rest_{i + 1}",
+            sp.Piecewise((0, takes), (remainder_i, True)),
+            f"remainder after row {i + 1}",
         )
         equations += [equation, adding, carried_equation]
         carried.append(added)
@@ -168,7 +170,7 @@ def _split_load() -> tuple[tuple[Equation, ...], sp.MatrixSymbol, sp.MatrixSymbo
     total = [ROW_LOAD.symbol[i, 0] + carried[i] for i in range(6)]
     equations += [
         Equation("d + U^-T e", whole, sp.ImmutableDenseMatrix(total)),
-        Equation("what is left of e", remaining, sp.ImmutableDenseMatrix(uncarried)),
+        Equation("remainder of e", remaining, sp.ImmutableDenseMatrix(uncarried)),
     ]
     return tuple(equations), whole, remaining
 
@@ -216,7 +218,7 @@ def qr_eliminate(nu: int) -> Derivation:
     )
     return Derivation(
         f"generic{nu}",
-        f"rows behind a hinge with {free_speeds(nu)}",
+        f"rows outboard of a hinge with {free_speeds(nu)}",
         (h, rotor, FLOOR, ROWS, ROW_LOAD, E, tau),
         (gain, offset, CARRIED_ROWS, CARRIED_ROW_LOAD, REMAINING_LOAD),
         equations,

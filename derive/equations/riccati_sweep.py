@@ -124,7 +124,7 @@ def forward(motion: HingeMotion, inputs: tuple[Quantity, ...]) -> Derivation:
     )
     return Derivation(
         motion.hinge.name,
-        f"bias motion behind the {motion.hinge.title}",
+        f"bias motion outboard of the {motion.hinge.title}",
         (RT, RO, *inputs, s, PARENT_MOTION),
         (R, SHIFT, MOTION, Quantity(rates, "", "coordinate rates")),
         (*equations, Equation("coordinate rates", rates, motion.in_arrays(motion.rates))),
@@ -140,7 +140,7 @@ def forward_generic(nu: int) -> Derivation:
     hinge = tuple(Quantity(x) for x in (rotation, d, h, v, w, c, s))
     return Derivation(
         f"generic{nu}",
-        f"bias motion behind a hinge with {nu} speeds",
+        f"bias motion outboard of a hinge with {nu} speeds",
         (RT, RO, *hinge, PARENT_MOTION),
         (R, SHIFT, MOTION),
         equations,
@@ -368,7 +368,7 @@ def required_load(nu: int) -> Derivation:
     inertia = Quantity(S.symbol, "", "inertia of everything outboard, at P", symmetric=True)
     return Derivation(
         f"generic{nu}",
-        f"load of what a hinge with {nu} speeds accelerates",
+        f"load of the bodies accelerated by a hinge with {nu} speeds",
         (inertia, h, rates),
         (E,),
         (Equation("e = S H udot", E.symbol, S.symbol * (h.symbol * rates.symbol)),),

@@ -92,8 +92,8 @@ def newton_euler_form() -> Derivation:
         title="Newton and Euler about the input end I, and the mass matrix that follows",
         notes=(
             "rdd_I is the acceleration of I, omegadot the angular acceleration; q_I and m_I are "
-            "the force and the moment that this motion needs there. a_I is [rdd_I; omegadot] and "
-            "f_I is [q_I; m_I], so that f_I = mass_matrix a_I + bias.",
+            "the force and the moment that this motion requires there. a_I is [rdd_I; omegadot] "
+            "and f_I is [q_I; m_I], so that f_I = mass_matrix a_I + bias.",
             "Parameters of the element are mass = M, mc = M r_IC and J = J_I.",
         ),
     )

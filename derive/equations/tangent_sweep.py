@@ -50,7 +50,9 @@ V_REL = Quantity(vector("v", 3), "m/s", "relative velocity of the hinge, body ax
 W_REL = Quantity(vector("w", 3), "rad/s", "relative angular velocity of the hinge, body axes")
 Z_PARENT = Quantity(vector("z_I", 9), "", "change of the parent's motion, parent axes")
 Z = Quantity(vector("z", 9), "", "change of the body's motion, own axes")
-ROWS_S = Quantity(symbol("S", 9, 6), "", "change of the load by that of the motion, a row an entry")
+ROWS_S = Quantity(
+    symbol("S", 9, 6), "", "change of the load by that of the motion, one row per entry"
+)
 
 
 def _spin_acceleration() -> sp.ImmutableDenseMatrix:
@@ -61,7 +63,7 @@ def _spin_acceleration() -> sp.ImmutableDenseMatrix:
 
 def tangent_carry() -> Derivation:
     """S Th, and X^T S Th added to the parent's S."""
-    s_th = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    s_th = Quantity(symbol("T", 9, 6), "", "S Th, one row per entry")
     parent = Quantity(symbol("S_I", 9, 6), "", "that of the parent", accumulate=True)
     s = ROWS_S.symbol.T
     turn, rate, linear = (s[:, 3 * k : 3 * k + 3] for k in range(3))
@@ -127,9 +129,13 @@ def tangent_moved() -> Derivation:
 
 # --- increments that are known ------------------------------------------------------------------
 
-KNOWN_MOTION = Quantity(symbol("b", 9), "", "change of motion that is known")
-KNOWN_LOAD = Quantity(symbol("e_b", 6), "N, N*m", "load by what is known, without the unknowns")
-_ROTATED_LOAD = Quantity(symbol("g", 6), "N, N*m", "change of the carried load by what is known")
+KNOWN_MOTION = Quantity(symbol("b", 9), "", "known change of motion")
+KNOWN_LOAD = Quantity(
+    symbol("e_b", 6), "N, N*m", "load due to known increments, without the unknowns"
+)
+_ROTATED_LOAD = Quantity(
+    symbol("g", 6), "N, N*m", "change of the carried load due to known increments"
+)
 
 
 def tangent_known() -> Derivation:
@@ -138,10 +144,10 @@ def tangent_known() -> Derivation:
     With S after elimination of the unknowns, the rows of the unknowns only need z + b in place
     of z (see `tangent_answer`).
     """
-    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load by the motion that is known")
+    load_rows = Quantity(symbol("e_S", 6), "N, N*m", "load due to the known motion")
     return Derivation(
         "frames",
-        "load by a motion that is known",
+        "load due to a known motion",
         (ROWS_S, KNOWN_MOTION, _ROTATED_LOAD),
         (load_rows, KNOWN_LOAD),
         (
@@ -166,16 +172,16 @@ def _square(name: str, meaning: str) -> Quantity:
 
 H = Quantity(sp.MatrixSymbol("H", 6, N), "", "motion subspace of the unknowns")
 B = _rows("B", 9, "motion along the unknowns")
-G = _rows("G", 6, "change of the load that is carried")
-W = _square("W", "slopes of the rows, a row a direction")
+G = _rows("G", 6, "change of the carried load")
+W = _square("W", "derivatives of the rows, one row per direction")
 D = _square("D", "rows by unknowns")
 V = Quantity(sp.MatrixSymbol("V", 6, N), "", "K + G")
 GAIN = _rows("gain", 9, "D^-1 times the rows by the motion")
-SOLUTION = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times what is left of the rows")
+SOLUTION = Quantity(sp.MatrixSymbol("y", N, 1), "", "D^-1 times the remainder of the rows")
 RIGHT = _rows("right", 9, "rows by the motion")
 OWN_K = _rows("K", 6, "own load along the unknowns")
-OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, a row an entry")
-OWN_D = _square("Z_x", "own rows by the unknowns, a row a direction")
+OWN_ROWS = Quantity(sp.MatrixSymbol("Z_z", 9, N), "", "own rows by the motion, one row per entry")
+OWN_D = _square("Z_x", "own rows by the unknowns, one row per direction")
 
 
 def invert() -> Derivation:
@@ -192,7 +198,7 @@ def invert() -> Derivation:
 
 def node() -> Derivation:
     """Elimination of the unknowns of a flexible body."""
-    without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, a row an entry")
+    without = Quantity(symbol("S_c", 9, 6), "", "S without the unknowns, one row per entry")
     s = ROWS_S.symbol.T
     k = symbol("K_x", 6, N)
     return Derivation(
@@ -222,7 +228,7 @@ def node() -> Derivation:
 
 def absorb() -> Derivation:
     """Contribution of the bodies outboard of a port to the unknowns of a flexible body."""
-    s_th = Quantity(symbol("T", 9, 6), "", "S Th, a row an entry")
+    s_th = Quantity(symbol("T", 9, 6), "", "S Th, one row per entry")
     load = Quantity(OWN_K.symbol, accumulate=True)
     rows = Quantity(OWN_ROWS.symbol, accumulate=True)
     by_unknowns = Quantity(OWN_D.symbol, accumulate=True)
@@ -233,7 +239,7 @@ def absorb() -> Derivation:
     parent_load = sp.BlockMatrix([[pushed.T, (R.symbol * moment + lever * pushed).T]])
     return Derivation(
         "tangent",
-        "what hangs on a port, as the unknowns of its body see it",
+        "part outboard of a port, along the unknowns of its body",
         (R, SHIFT, H, B, G, W, ROWS_S, s_th),
         (k, load, rows, by_unknowns),
         (
@@ -251,7 +257,7 @@ def absorb() -> Derivation:
 def push() -> Derivation:
     """One right-hand side: y = D^-1 (-e_f - H^T e), and the load e + V y."""
     load_rows = Quantity(sp.MatrixSymbol("e_f", N, 1), "", "load of the rows")
-    right_side = Quantity(sp.MatrixSymbol("rest", N, 1), "", "what is left of the rows")
+    right_side = Quantity(sp.MatrixSymbol("rest", N, 1), "", "the remainder of the rows")
     load = Quantity(symbol("e_c", 6), "N, N*m", "load without the unknowns")
     return Derivation(
         "tangent",
@@ -289,7 +295,7 @@ def answer() -> Derivation:
     """x = y - D^-1 H^T S z, and the motion including that of the unknowns."""
     return Derivation(
         "tangent",
-        "unknowns that answer a right-hand side",
+        "solution for a right-hand side",
         (B, GAIN, SOLUTION, BASE_MOTION),
         (UNKNOWNS, Z),
         (
@@ -314,10 +320,10 @@ def displaced() -> Derivation:
 
 def lag() -> Derivation:
     """Q = (sq 1 - kappa g_q)^-1 of a hinge whose rates depend on its coordinates."""
-    slopes = _square("g_q", "slopes of the rates by the coordinates, a row a direction")
+    slopes = _square("g_q", "derivatives of the rates by the coordinates, one row per direction")
     unit = _square("one", "unit matrix")
     scale = Quantity(vector("sq", 1), "1/s", "inverse time of the step")
-    share = Quantity(vector("kappa", 1), "", "1 where the rates' own slopes count")
+    share = Quantity(vector("kappa", 1), "", "1 to include the derivatives of the rates")
     matrix, out = _square("A", "sq 1 - kappa g_q"), _square("Q", "its inverse")
     return Derivation(
         "tangent",

@@ -94,7 +94,7 @@ def bias_load(body: Body) -> Derivation:
     residual = body.residual(_triple(motion, 6), _triple(motion, 3), _triple(motion, 0), p)
     return Derivation(
         body.name,
-        f"load that the bias motion of the {body.title} needs",
+        f"load required by the bias motion of the {body.title}",
         (parameters, MOTION),
         (E,),
         (*carried, *_load_equations(body, array, _substitute_parameters(residual, p, array))),

@@ -62,14 +62,14 @@ def efforts_of(x: str, when: str, *more: Step) -> ForEach:
 #: Multipliers are known from an earlier evaluation of accelerations in this workspace.
 COUPLINGS_LOADED = Pass(
     "couplings_loaded", "body",
-    "Rows of couplings at the accelerations that are given, and the efforts of their multipliers.",
+    "Rows of couplings at the given accelerations, and the efforts of their multipliers.",
     (efforts_of("pending.x", "", EFFORTS_TO_KNOWN),),
     skip="aside",
 )  # fmt: skip
 
 COUPLINGS_ANSWERED = Pass(
     "couplings_answered", "coupling",
-    "Multipliers of couplings, and the power that those feed in whose values go by time.",
+    "Multipliers of couplings, and the power supplied by time-dependent couplings.",
     (
         Add(to="coupling.x", source="coupling.told", when="refined"),
         *only(

@@ -98,7 +98,7 @@ STRAIN = Pass(
 )  # fmt: skip
 
 DRAG = Pass(
-    "drag", "body", "Viscous drag of flexible bodies: momentum under the density of the drag.",
+    "drag", "body", "Viscous drag of flexible bodies: momentum with the drag as density.",
     (
         call("modal.momentum", **_DRAG, **_STATE, v="body.v", w="body.w", S="local.S",
              S_rf="modes.based", A="modes.A_drag", h="local.h", h_f="modes.felt", T="local.T"),

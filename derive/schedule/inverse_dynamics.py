@@ -19,7 +19,7 @@ EFFORT_AND_TRANSPORT = (
 )  # fmt: skip
 
 REQUIRED = Pass(
-    "required", "body", "Efforts beyond the laws' own, and the load on the parent.",
+    "required", "body", "Efforts required beyond those of the laws, and the load on the parent.",
     (
         *only("section", *MODAL_EFFORT),
         Copy(to="modes.required", source="modes.e_f", when="modal"),

@@ -108,7 +108,7 @@ _EFFORTS = EachSpeed(
 CLOSURES = Pass(
     "closures",
     "body",
-    "Rows of what closes a loop, and the load of a hinge's laws.",
+    "Rows of the element that closes a loop, and the load of the laws of a hinge.",
     (
         *_RELATIVE_MOTION,
         *_gap_calls("gaping"),
@@ -154,8 +154,7 @@ CLOSURES = Pass(
 
 #: Multipliers are known from an earlier evaluation of accelerations in this workspace.
 CLOSURES_LOADED = Pass(
-    "closures_loaded", "body", "Rows of a hinge that closes a loop, and all the load that it puts"
-    " on its bodies.",
+    "closures_loaded", "body", "Rows of a cut hinge, and its complete load on its bodies.",
     (
         *_RELATIVE_MOTION,
         *_CONSTRAINT_STEPS,
@@ -181,7 +180,7 @@ _ROW = {"inverse": "row.inverse", "l": "row.known"}
 _COLUMN = {"inverse": "row.inverse", "K": "row.K"}
 
 ROW_CLOSED = Pass(
-    "row_closed", "row", "A row closed on the body where its ends meet.",
+    "row_closed", "row", "A row eliminated on the body where its ends meet.",
     (
         Copy(to="row.inverse", when="unmoved"),
         call("loops.settle", when="!unmoved", inverse="row.inverse", L="row.pivot",
@@ -222,7 +221,7 @@ ROW_FOUND = Pass(
 )  # fmt: skip
 
 UNLOADED = Pass(
-    "unloaded", "body", "No load and no effort: the rows alone are to be met.",
+    "unloaded", "body", "Loads and efforts set to zero: only the rows are to be satisfied.",
     (Copy(to="body.e"), Copy(to="body.tau"), *only("modal", Copy(to="modes.e_f"))),
 )  # fmt: skip
 
@@ -397,7 +396,7 @@ ANSWERED = Pass(
 )  # fmt: skip
 
 CLOSURES_ANSWERED = Pass(
-    "closures_answered", "body", "Accelerations and load of a hinge that closes a loop.",
+    "closures_answered", "body", "Accelerations and load of a cut hinge.",
     (
         Copy(to="body.udot", source="body.s"),
         Add(to="body.udot", source="body.chosen", when="staged !corrected"),

@@ -8,7 +8,7 @@ from .pass_steps import TIPS_TO_ROOT, Add, Copy, Pass, RunPass, ScatterSpeeds, c
 from .riccati_sweep import BODY, FREE, FREE_EFFORTS
 
 FACTORISE = Pass(
-    "factorise", "body", "Mass matrices carried to the root; what each elimination leaves is kept.",
+    "factorise", "body", "Mass matrices carried to the root; factors of eliminations stored.",
     (
         RunPass(whole=HINGE_MOTION, when="own"),
         # Loads are carried but not read: each column starts from zero load.
@@ -23,7 +23,7 @@ FACTORISE = Pass(
 )  # fmt: skip
 
 COLUMN = Pass(
-    "column", "body", "One column as efforts, and no load yet.",
+    "column", "body", "Efforts of one right-hand side; loads set to zero.",
     (
         Copy(to="body.e"),
         Copy(to="body.tau", source="body.column"),
@@ -33,7 +33,7 @@ COLUMN = Pass(
 )  # fmt: skip
 
 COLUMN_CARRIED = Pass(
-    "column_carried", "body", "The column's load carried across the hinge to the parent.",
+    "column_carried", "body", "Load of the right-hand side carried across the hinge to the parent.",
     (
         *only("modal section", *MODAL_EFFORT),
         *only("modal", call("modal.pushed", Gg="modes.gain", e="body.e", e_f="modes.e_f",
@@ -48,7 +48,7 @@ COLUMN_CARRIED = Pass(
 )  # fmt: skip
 
 COLUMN_ANSWERED = Pass(
-    "column_answered", "body", "Accelerations that answer the column.",
+    "column_answered", "body", "Accelerations due to the right-hand side.",
     (
         call("generic{free}.answer", **BODY, H="hinge.H_free", F="hinge.F", G="hinge.G",
              y="hinge.g", delta_I="parent.delta", udot="hinge.rates", delta="body.delta"),

@@ -72,7 +72,7 @@ _APPLIED_LOAD = next(
 _LOAD_INPUTS = LOADS.steps[: LOADS.steps.index(_APPLIED_LOAD)]
 
 LOADS_BY_PLACE = Pass(
-    "loads_by_place", "load", "Change of a load in the axes of space as its body turns.",
+    "loads_by_place", "load", "Change of a load in inertial axes by the rotation of its body.",
     (
         *_LOAD_INPUTS,
         *_along_position(
@@ -105,7 +105,7 @@ _FORCE_DERIVATIVES = tuple(map(_skip_ground_end, filter(_computes_derivative, _F
 _GROUND_END = tuple(Copy(to=f"{D}local.{name}_{end}") for end in "FT" for name in "Axvw")
 
 FORCES_BY_PLACE = Pass(
-    "forces_by_place", "force", "Change of an element to the ground as its body moves.",
+    "forces_by_place", "force", "Change of the load of an element on the ground by its motion.",
     (
         *(step for step in _FORCE_STEPS if not _computes_derivative(step)),
         *_GROUND_END,

@@ -99,7 +99,7 @@ ACCELERATIONS = Sweep(
 ACCELERATIONS_IN_PLANE = planar_sweep(ACCELERATIONS)
 
 INVERSE_DYNAMICS = Sweep(
-    "inverse_dynamics", "Efforts that given accelerations need beyond the laws' own.",
+    "inverse_dynamics", "Efforts required by given accelerations in addition to those of the laws.",
     (
         *_GIVEN_RUNS,
         Run(whole=FORWARD),
@@ -117,8 +117,8 @@ INVERSE_DYNAMICS = Sweep(
 
 CORRECTION = Sweep(
     "correction",
-    "The least change, by inertia, that closes gaps or stops slips of closed loops, and what a"
-    " strike adds to it.",
+    "Smallest change, weighted by inertia, that removes position gaps or velocity errors of closed"
+    " loops, and the contribution of an impact.",
     (
         Run(whole=PRESCRIBED),
         Run(hook="drive_values", when="driven"),
@@ -137,7 +137,7 @@ MOTION = Sweep(
     "motion", "Poses and velocities of all bodies.",
     (*_GIVEN_RUNS, Run(whole=FORWARD), Run(whole=POSES)),
 )  # fmt: skip
-POSED = Sweep("posed", "Poses alone, behind a sweep.", (Run(whole=POSES),))
+POSED = Sweep("posed", "Poses only, after a sweep.", (Run(whole=POSES),))
 
 FACTORISATION = Sweep(
     "factorisation",
@@ -146,7 +146,7 @@ FACTORISATION = Sweep(
 )
 SOLUTION = Sweep(
     "solution",
-    "One column: accelerations that given efforts alone produce.",
+    "One right-hand side: accelerations due to given efforts only.",
     (Run(whole=COLUMN), Run(whole=COLUMN_CARRIED), Run(whole=COLUMN_ANSWERED)),
 )
 

@@ -104,7 +104,7 @@ _COUPLING_RUNS = (
 )
 _CLOSURE_RUN = Run(whole=differentiate_pass(_skip_hinge_motion(CLOSURES_LOADED)), when="looped")
 DIRECTIONAL = Sweep(
-    "required_slope", "Derivative of the efforts that given accelerations need.",
+    "required_slope", "Derivative of the efforts required by given accelerations.",
     (
         *_MOTION_RUNS,
         Run(whole=differentiate_pass(EFFORTS)),
@@ -117,7 +117,7 @@ DIRECTIONAL = Sweep(
     ),
 )  # fmt: skip
 
-_NO_LOADS = Pass("no_loads", "body", "Loads begun from none.", (Copy(to=D + "body.e"),))
+_NO_LOADS = Pass("no_loads", "body", "Loads set to zero.", (Copy(to=D + "body.e"),))
 
 
 def _across_tree(whole: Pass, own: str) -> Run:
@@ -133,7 +133,7 @@ def _across_tree(whole: Pass, own: str) -> Run:
 #: include them.
 APPLIED_SLOPE = Sweep(
     "applied_slope",
-    "Derivative of what acts across the tree, and of the values of expressions.",
+    "Derivative of loads between branches of the tree, and of the values of expressions.",
     (
         *_MOTION_RUNS,
         _POSE_RUN,
@@ -266,7 +266,7 @@ _HINGE = (
 )  # fmt: skip
 
 LAG = Pass(
-    "lag", "body", "How the coordinates of a hinge follow its speeds within a step.",
+    "lag", "body", "Derivatives of the coordinates of a hinge by its speeds within a step.",
     (
         call("hinge.rates_by_coordinates", **COORDINATES, J="tangent.turns"),
         call("hinge.rates_by_speeds", **COORDINATES, J="tangent.ways"),
@@ -311,7 +311,7 @@ LAW_CHANGE = tuple(
 LAW_SLOPES = Pass(
     "law_slopes",
     "law",
-    "Slopes of a law along the unknowns of its hinge.",
+    "Derivatives of a law along the unknowns of its hinge.",
     (
         ForEachDirection(
             of="felt", steps=(*LAW_CHANGE, Add(to="law.slopes", source=D + "local.tau"))
@@ -320,7 +320,7 @@ LAW_SLOPES = Pass(
 )
 
 TANGENT_OWN = Pass(
-    "tangent_own", "body", "A body's own load by its motion and its modes.",
+    "tangent_own", "body", "Derivatives of a body's own load by its motion and its modes.",
     (
         Copy(to="tangent.laws", when="laws"),
         RunPass(whole=LAG, when="curved"),
@@ -404,11 +404,11 @@ TANGENT_CONDENSE = Pass(
 
 #: The same in two passes, for many tangents at one state: contributions are computed once.
 TANGENT_BROUGHT = Pass(
-    "tangent_brought", "body", "What a body brings to the elimination.", _COLUMNS, skip="aside"
+    "tangent_brought", "body", "Contribution of a body to the elimination.", _COLUMNS, skip="aside"
 )
 TANGENT_ELIMINATED = replace(
     TANGENT_CONDENSE, name="tangent_eliminated",
-    purpose="Unknowns of a body eliminated, of what it brings.", steps=_ELIMINATION_STEPS,
+    purpose="Unknowns of a body eliminated from its contribution.", steps=_ELIMINATION_STEPS,
 )  # fmt: skip
 
 _CONTRIBUTION_RUNS = (
@@ -419,12 +419,12 @@ _CONTRIBUTION_RUNS = (
 )
 TANGENT = Sweep(
     "tangent",
-    "Tangent of inverse dynamics factored, behind inverse dynamics itself.",
+    "Tangent of inverse dynamics factored, after inverse dynamics itself.",
     (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_CONDENSE)),
 )
 BROUGHT = Sweep(
     "tangent_brought",
-    "What the tangent is eliminated from, behind inverse dynamics.",
+    "Contributions to the tangent before elimination, after inverse dynamics.",
     (*_CONTRIBUTION_RUNS, Run(whole=TANGENT_BROUGHT)),
 )
 
@@ -516,7 +516,7 @@ def _motion_with_modes(*known_steps: Step) -> tuple[Step, ...]:
 
 
 TANGENT_ANSWERED = Pass(
-    "tangent_answered", "body", "Unknowns that answer a right-hand side.",
+    "tangent_answered", "body", "Solution for a right-hand side.",
     (
         Copy(to="body.answer"),
         position_dependent_loads.POSITION_CHANGE,
@@ -530,7 +530,7 @@ TANGENT_ANSWERED = Pass(
 
 TANGENT_SOLUTION = Sweep(
     "tangent_solution",
-    "One right-hand side through the factored tangent.",
+    "One right-hand side solved with the factored tangent.",
     (
         Run(whole=TANGENT_COLUMN),
         Run(hook="unit_load", when="united"),
@@ -545,7 +545,7 @@ TANGENT_SOLUTION = Sweep(
 KNOWN_COLUMN = Pass(
     "known_column",
     "body",
-    "A right-hand side, and own loads by what is known of modes.",
+    "A right-hand side, with own loads due to known modal increments.",
     (
         _NO_LOAD,
         Copy(to=D + "body.tau", source="body.column"),
@@ -561,7 +561,7 @@ KNOWN_COLUMN = Pass(
 )
 
 KNOWN_LAWS = Pass(
-    "known_laws", "law", "Change of a law's efforts by what is known of its hinge.",
+    "known_laws", "law", "Change of the efforts of a law due to known increments of its hinge.",
     (*LAW_CHANGE, Add(to=D + "law.tau", source=D + "local.tau")),
 )  # fmt: skip
 
@@ -576,7 +576,7 @@ _KNOWN_LOAD = Add(to=D + "body.e", source="local.known")
 #: Rows of a hinge: carried load by the known increments, less the right-hand side and the change of
 #: laws, which KNOWN_COLUMN and KNOWN_LAWS add.
 KNOWN_CARRIED = Pass(
-    "known_carried", "body", "The same loads carried to the parent, with what is known.",
+    "known_carried", "body", "The same loads carried to the parent, with known increments.",
     (
         *only("section", _CARRIER, *_KNOWN_ROWS),
         *only("modal section", *_modal_load_steps("section.H")),
@@ -600,7 +600,7 @@ KNOWN_CARRIED = Pass(
 )  # fmt: skip
 
 KNOWN_ANSWERED = Pass(
-    "known_answered", "body", "Unknowns that answer a right-hand side, beside what is known.",
+    "known_answered", "body", "Solution for a right-hand side with known increments.",
     (
         Copy(to="body.answer"),
         position_dependent_loads.POSITION_CHANGE,
@@ -620,7 +620,7 @@ KNOWN_ANSWERED = Pass(
 
 TANGENT_BEYOND = Sweep(
     "tangent_beyond",
-    "One right-hand side through the factored tangent, parts of the increments being known.",
+    "One right-hand side solved with the factored tangent and known increments.",
     (
         Run(whole=KNOWN_COLUMN),
         Run(whole=KNOWN_LAWS),

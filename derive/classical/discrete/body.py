@@ -158,7 +158,7 @@ def _linearised_equations(
             shape,
             _coordinate_derivative(space, modes, solved, letters),
             "",
-            "d F_b / d y; the frame's turn moves a and the rows themselves",
+            "d F_b / d y; the rotation of the frame changes a and the rows themselves",
         ),
         Equation("frame axes of rows and columns", x, Matrix(axes)),
         Equation(

@@ -148,7 +148,7 @@ def pin_hinge(
     """Pin in space: one free angle; the next pin's axis rotates with its section."""
     axis, free = vector("a", 3), vector("x_turn", 1)
     rotation_equation = Equation(
-        "rotation about the axis alone", section_rotation(pair, "O"),
+        "rotation about the axis only", section_rotation(pair, "O"),
         section_rotation(pair, "I") + axis * free + vector("beta", 3),
     )  # fmt: skip
     inputs, condition, rows = _next_pin_condition(pair, number)
@@ -175,7 +175,7 @@ def pin_hinge(
             conditions=(condition,),
             notes=(
                 _NEXT_HINGE_NOTE,
-                "The condition is that of the next axis as it turns with its section, "
+                "The condition is that of the next axis as it rotates with its section, "
                 "a_n + s x a_n, to first order.",
             ),
         )

@@ -75,7 +75,7 @@ def planar_spring(pair: Pairing, element: str, source: str, equation: str) -> De
 
 _NOTES = (
     "Where the springs carry nothing and have no length at the predictor (q_s = 0, d_s = 0) this "
-    "is the relation of the book, which leaves out d x q and the turning of the springs.",
+    "is the relation of the book, which neglects d x q and the rotation of the springs.",
 )
 
 
@@ -115,7 +115,7 @@ def _planar_law_equations() -> tuple[Equation, ...]:
     slope = -moment[0, 0].xreplace({predicted[0, 0]: angle}).diff(angle)
     return (
         Equation("moment of the torsion spring", vector("m_s", 1), moment, "(8.108)"),
-        Equation("its slope", sp.MatrixSymbol("Z_r", 1, 1),
+        Equation("its derivative", sp.MatrixSymbol("Z_r", 1, 1),
                  Matrix([slope.xreplace({angle: predicted[0, 0]})]), "(8.110)"),
         Equation("impedance of the springs", sp.MatrixSymbol("Z_t", 2, 2), _impedance("t", 2)),
     )  # fmt: skip
@@ -228,7 +228,9 @@ def _carried_row_equations(pair: Pairing) -> tuple[Equation, ...]:
         turn - sp.MatrixSymbol("Y_r", space.rotation_count, space.rotation_count) * elastic_moment
     )
     return (
-        Equation("turn of the inboard section", turn, _section_rotation_rows(pair), "", "on z_I"),
+        Equation(
+            "rotation of the inboard section", turn, _section_rotation_rows(pair), "", "on z_I"
+        ),
         Equation(
             "change of the elongation",
             change,
@@ -248,7 +250,7 @@ def _carried_row_equations(pair: Pairing) -> tuple[Equation, ...]:
             outboard_angle,
             outboard_rotation if predicted_angle is None else outboard_rotation + predicted_angle,
             "",
-            "its angle" if space.planar else "its turn",
+            "its angle" if space.planar else "its rotation",
         ),
     )
 

@@ -48,9 +48,9 @@ SHIFT = Quantity(symbol("d", 1), "m", "shift along z")
 BODY = Quantity(
     symbol("b", 11), "", "parameters of the rigid body, body axes; rotor inertia of its hinge"
 )
-OWN_LOAD = Quantity(symbol("e_B", 6), "N, N*m", "load that the bias motion of the body needs")
-OUTER_S = Quantity(symbol("S_K", 6, 6), "", "S of what hangs on the body", symmetric=True)
-OUTER_E = Quantity(symbol("e_K", 6), "N, N*m", "e of what hangs on the body")
+OWN_LOAD = Quantity(symbol("e_B", 6), "N, N*m", "load required by the bias motion of the body")
+OUTER_S = Quantity(symbol("S_K", 6, 6), "", "S of the outboard part", symmetric=True)
+OUTER_E = Quantity(symbol("e_K", 6), "N, N*m", "e of the outboard part")
 
 
 def _about_x() -> Stage:
@@ -84,7 +84,7 @@ def _angle_and_shift(motion: HingeMotion) -> tuple[sp.Expr, sp.Expr]:
 
 def rotation_derivation(motion: HingeMotion) -> Derivation:
     """Angle about z."""
-    theta = Quantity(symbol("turn", 1), "rad", "angle about z, in place of its cosine and sine")
+    theta = Quantity(symbol("turn", 1), "rad", "angle about z instead of its cosine and sine")
     value = _angle_and_shift(motion)[0] + LINK.symbol[3, 0]
     return Derivation(
         motion.hinge.name,
@@ -103,7 +103,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
     rates = symbol("qdot", motion.rates.rows)
     return Derivation(
         motion.hinge.name,
-        f"bias motion of a rigid body behind the {motion.hinge.title}",
+        f"bias motion of a rigid body outboard of the {motion.hinge.title}",
         (LINK, ROTATION, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
         (SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
         (
@@ -180,7 +180,7 @@ def recover(motion: HingeMotion, rotor: bool = False) -> Derivation:
     full = with_unit_columns(gain.symbol, {} if rotor else unit_directions(subspace))
     return Derivation(
         motion.hinge.name,
-        f"accelerations of a rigid body behind the {motion.hinge.title}",
+        f"accelerations of a rigid body outboard of the {motion.hinge.title}",
         (LINK, ROTATION, SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
         (rates, DELTA),
         (

@@ -85,7 +85,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
     lever = part(SHIFT.symbol, 0)
     return Derivation(
         motion.hinge.name,
-        f"bias motion of a rigid body behind the {motion.hinge.title}",
+        f"bias motion of a rigid body outboard of the {motion.hinge.title}",
         (LINK, ROTATION, BODY, *hinge_quantities(motion.hinge), PARENT_MOTION),
         (NO_SHIFT, MOTION, OWN_LOAD, Quantity(rates, "", "coordinate rates")),
         (
@@ -93,7 +93,7 @@ def forward(motion: HingeMotion, body: Body) -> Derivation:
             Equation("no shift", NO_SHIFT.symbol, sp.ImmutableDenseMatrix(sp.zeros(0, 1))),
             Equation("K = wd~ + w~ w~", carrier, tilde(wd) + tilde(w) * tilde(w)),
             Equation(
-                "bias motion before the hinge",
+                "bias motion inboard of the hinge",
                 motion_q,
                 stack(back * w, back * wd, back * (rdd + carrier * lever)),
             ),
@@ -159,7 +159,7 @@ def recover(motion: HingeMotion) -> Derivation:
     kept = sp.ImmutableDenseMatrix(nu, nu, lambda i, j: gain.symbol[i, 3 + j])
     return Derivation(
         motion.hinge.name,
-        f"accelerations of a rigid body behind the {motion.hinge.title}",
+        f"accelerations of a rigid body outboard of the {motion.hinge.title}",
         (LINK, ROTATION, NO_SHIFT, *hinge_quantities(motion.hinge)[:1], gain, offset, PARENT_DELTA),
         (rates, DELTA),
         (

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from mstmm.errors import SceneError
-from mstmm.expression.expression import Expression, parse
 from mstmm.numerics.rotations import to_matrix, to_quaternion
 from mstmm.scene import Body, Hinge, Scene, split_reference
 from mstmm.scene.tables.body import End
@@ -20,7 +19,7 @@ from mstmm.scene.tables.loads import Load
 from ...flexible.modal_body import ModalBody
 from ...flexible.modal_port import MassPoint, ModalPort
 from ..loops.cut_tree import Cut
-from .rigid_substitution import RigidSubstitution
+from .rigid_substitution import RigidSubstitution, scale_expression
 
 HELD, POINT = "held", "point"
 
@@ -149,7 +148,7 @@ class _Expansion:
             axes = on if load.axes == "body" else load.axes
             return load.model_copy(update={"on": on, "axes": axes})
         length = self._span_length(load)
-        force = tuple(_scale_expression(entry, length) for entry in load.force_per_length)
+        force = tuple(scale_expression(entry, length) for entry in load.force_per_length)
         axes = name if load.axes == "body" else load.axes
         return load.model_copy(update={"on": f"{name}.{load.name}", "force": force, "axes": axes})
 
@@ -223,12 +222,6 @@ class _Expansion:
         weld = Hinge(name="weld", type="fixed", inboard="ground", outboard="frame")
         update = {"name": name, "inboard": inboard, "outboard": outboard}
         self.internal.append(weld.model_copy(update=update))
-
-
-def _scale_expression(entry: Expression, factor: float) -> Expression:
-    if entry.is_zero:
-        return entry
-    return parse(f"{factor!r} * ({entry.text})", constants=dict(entry.constants))
 
 
 __all__ = ["ExpandedScene", "Passage", "expand"]

@@ -223,7 +223,7 @@ class _Substitution:
         if load.force_per_length is None:
             return load.model_copy(update=update | {"on": self._node(load.on)})
         first, last = load.span or (0.0, self._length(name))
-        force = tuple(_scale_expression(entry, last - first) for entry in load.force_per_length)
+        force = tuple(scale_expression(entry, last - first) for entry in load.force_per_length)
         on = self._node(f"{name}.{load.name}")
         return load.model_copy(
             update=update | {"on": on, "force": force, "force_per_length": None, "span": None}
@@ -235,7 +235,8 @@ def _middle(load: Load, length: float) -> float:
     return (first + last) / 2
 
 
-def _scale_expression(entry: Expression, factor: float) -> Expression:
+def scale_expression(entry: Expression, factor: float) -> Expression:
+    """Copy of an expression, multiplied by a factor."""
     if entry.is_zero:
         return entry
     return parse(f"{factor!r} * ({entry.text})", constants=dict(entry.constants))
