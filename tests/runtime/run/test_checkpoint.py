@@ -113,11 +113,11 @@ def interrupted(monkeypatch: pytest.MonkeyPatch, at: float) -> None:
     """Ctrl-C, from within, as soon as a run has passed this time."""
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
-    def look(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
+    def report_and_save(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
         if run.t > at:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(run_execution.RunMonitor, "look", look)
+    monkeypatch.setattr(run_execution.RunMonitor, "report_and_save", report_and_save)
 
 
 def test_a_checkpoint_of_another_run_is_refused(
@@ -251,7 +251,7 @@ def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = mstmm.compile(pins(2, [0.3, 0.4]))
-    monkeypatch.setattr(run_execution, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(run_execution, "CHECKPOINT_INTERVAL", 0.0)
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
     def full(*_: object) -> None:
@@ -268,7 +268,7 @@ def test_a_full_disk_during_the_run_costs_the_checkpoint_only(
 def test_checkpoints_are_written_on_the_way(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run_execution, "CHECKPOINT_EVERY", 0.0)
+    monkeypatch.setattr(run_execution, "CHECKPOINT_INTERVAL", 0.0)
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
     path, seen = tmp_path / "run.npz", list[int]()
 
@@ -400,11 +400,11 @@ def test_ctrl_c_in_the_second_run_costs_the_estimate_only(
 ) -> None:
     monkeypatch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
 
-    def look(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
+    def report_and_save(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
         if self.run == 1 and run.t > 0.5:
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(run_execution.RunMonitor, "look", look)
+    monkeypatch.setattr(run_execution.RunMonitor, "report_and_save", report_and_save)
     run = mstmm.compile(pins(1, [0.3])).simulate(2.0, certify=True)
     assert run.success and run.t[-1] == 2.0 and run.certificate.error is None
     assert any("interrupted" in text for text in run.warnings)

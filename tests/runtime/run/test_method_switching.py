@@ -162,7 +162,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
 ) -> None:
     """Interrupted before the change and after it; events and a release lie behind."""
 
-    def look(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
+    def report_and_save(self: run_execution.RunMonitor, run: Integrator, earlier: object) -> None:
         if run.t > at:
             signal.raise_signal(signal.SIGINT)
 
@@ -171,7 +171,7 @@ def test_an_interrupted_run_goes_on_bit_for_bit(
     whole = model.simulate(2.0, **options)
     with monkeypatch.context() as patch:
         patch.setattr("mstmm.runtime.run.integration_run.SLICE", 0.0)
-        patch.setattr(run_execution.RunMonitor, "look", look)
+        patch.setattr(run_execution.RunMonitor, "report_and_save", report_and_save)
         part = model.simulate(2.0, execution=mstmm.Execution(checkpoint=path), **options)
     assert part.status is None and (len(part.method_history) == 1) == (at == 0.001)
     rest = model.simulate(2.0, execution=mstmm.Execution(checkpoint=path, resume=True), **options)
