@@ -115,7 +115,7 @@ def method(name: str, **options: Any) -> Method:
 
     Raises SceneError for an option that the method does not have.
     """
-    family = _family(name)
+    family = _family(require_word("method", name, "a name such as dop853"))
     unknown = sorted(options.keys() - {f.name for f in fields(family)})
     if unknown:
         owners = [f.__name__ for f in FAMILIES if unknown[0] in {x.name for x in fields(f)}]
@@ -127,6 +127,7 @@ def method(name: str, **options: Any) -> Method:
 def to_method(given: str | Method) -> Method:
     """Method from an object or a name.  SceneError for other types."""
     if isinstance(given, Method):
+        require_word("method", given.name, "a name such as dop853")
         return given
     return method(require_word("method", given, "a name such as dop853, or one of mstmm.methods"))
 

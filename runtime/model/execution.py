@@ -6,6 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from mstmm.argument_validation import abbreviate, require_bool
+from mstmm.errors import SceneError
+
 
 @dataclass(frozen=True)
 class Execution:
@@ -26,3 +29,16 @@ class Execution:
     progress: Callable[[float, float], None] | None = None
     checkpoint: str | Path | None = None
     resume: bool = False
+
+
+def check_execution(given: Execution | None) -> Execution:
+    """Checked execution, the default for None.  SceneError for other types."""
+    run = Execution() if given is None else given
+    if not isinstance(run, Execution):
+        raise SceneError(f"execution = {abbreviate(run)}: expected an mstmm.Execution")
+    if run.progress is not None and not callable(run.progress):
+        raise SceneError(
+            f"progress = {abbreviate(run.progress)}: expected a function of (t, t_end)"
+        )
+    require_bool("resume", run.resume)
+    return run

@@ -21,7 +21,7 @@ from mstmm.risk import Risk
 from ..engine.input_values import InputValue
 from ..integrate.methods import Method, to_method
 from ..integrate.settings import Settings, to_output_times, validate
-from .execution import Execution
+from .execution import Execution, check_execution
 from .linear_analysis import LinearAnalysis
 
 if TYPE_CHECKING:
@@ -270,9 +270,9 @@ class Model(LinearAnalysis, PublicMembers, NotebookDisplay):
         from .run_results import simulate
         from .target_error.error_request import Control, parse_error_request
 
-        run = Execution() if execution is None else execution
+        run = check_execution(execution)
         model = self if inputs is None else self.with_inputs(inputs)
-        certify, resume = require_bool("certify", certify), require_bool("resume", run.resume)
+        certify, resume = require_bool("certify", certify), run.resume
         chosen = None if method is None else to_method(method)
         given = Control(None if chosen is None else chosen.name or None, step, rtol, atol)
         request = parse_error_request(error, given, run.checkpoint is not None or resume)

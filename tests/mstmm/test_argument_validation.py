@@ -93,7 +93,9 @@ WORDS: dict[str, tuple[Callable[[Any, Any], Any], str]] = {
         "expected one of warn, refuse",
     ),
     "progress": (
-        lambda r, x: r.model.simulate(0.1, execution=mstmm.Execution(progress=x)),
+        lambda r, x: r.model.simulate(
+            0.1, execution=mstmm.Execution(progress=3 if callable(x) else x)
+        ),
         "progress = .*: expected",
     ),
     "resume": (

@@ -98,7 +98,7 @@ def made_up(**changes: object) -> CaseDefinition:
     values = {
         "name": "made-up",
         "title": "Made up",
-        "why": "So.",
+        "cause": "So.",
         "parameter": "x",
         "unit": "m",
         "low": 1.0,

@@ -9,6 +9,7 @@ import pytest
 
 from mstmm.atlas.case_result import CaseResult
 from mstmm.atlas.page import markdown_page
+from mstmm.plain_data import from_plain
 from tests.mstmm.atlas.cases.test_cases import EXPECTED
 from tests.support.paths import ROOT
 
@@ -28,7 +29,7 @@ def test_every_case_is_on_the_page(kept: list[dict[str, Any]]) -> None:
 
 
 def test_the_page_says_what_the_data_do(kept: list[dict[str, Any]]) -> None:
-    text = markdown_page([CaseResult(**case) for case in kept], pictures=True)
+    text = markdown_page([from_plain(CaseResult, case) for case in kept], pictures=True)
     assert (FOLDER / "atlas.md").read_text() == text, AGAIN
 
 
