@@ -58,7 +58,7 @@ def spec_of(element: Element) -> ElementSpec:
 
 
 def spec_from(element: Element, kernels: tuple[Kernel, ...]) -> ElementSpec:
-    """ElementSpec of an element and its derived kernels."""
+    """Build the specification of an element: lowered kernels and properties of a hinge."""
     hinge = element if isinstance(element, Hinge) else None
     lowered = _lower_kernels(kernels, kind_of(element))
     return ElementSpec(

@@ -87,7 +87,7 @@ def inertia(body: Body) -> Derivation:
 
 
 def bias_load(body: Body) -> Derivation:
-    """e of the single body: residual at the bias motion."""
+    """Derive the load e of f = S a + e of a user-defined body: its residual at the bias motion."""
     p, array, parameters = _columns(body)
     carried = () if body.uses_hinge_axes else _motion_equations(body, array)
     motion = carried[-1].left if carried else MOTION.symbol

@@ -128,7 +128,7 @@ def _element_page(of: str | Element, keep: Sequence[str]) -> EquationSheet:
 
 
 def _model_page(model: Model, keep: Sequence[str] = ()) -> EquationSheet:
-    """Equations of a scene; see `equations`."""
+    """Sheet of a scene: its tree and passes, and closed equations where they are short enough."""
     closed_form: SymbolicEquations | None = None
     reason = ""
     try:

@@ -52,7 +52,7 @@ _MAX_ZERO_ACCELERATION = 1e-12
 def symbolic_linear_model(
     linear: LinearEquations, keep: Sequence[str], kernels: Kernels
 ) -> SymbolicLinearModel:
-    """Derive the linear model in SymPy; see `LinearEquations.symbolic`."""
+    """M, C, K, V, W in SymPy; all values but those named in `keep` are inserted as numbers."""
     _require_symbolic(linear)
     names = resolve_kept_names(linear, keep)
     reason = "formula; linearize models of other values"

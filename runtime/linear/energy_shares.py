@@ -69,7 +69,7 @@ def strain_shares(linear: LinearEquations, shapes: NDArray[Any]) -> dict[str, Ar
 
 
 def _stiffness_operator(linear: LinearEquations, engine: Any) -> Callable[[Array], Array]:
-    """Operator K x of a scene, with x' = G x + du."""
+    """Operator x -> K x of a scene; x' = G x + speeds, where it has a rate matrix G."""
     pencil = Pencil(engine, linear.state, list(linear.model.free_speed_indices))
     turning = linear.rate_matrix if linear.constrained_motion is None else None
     if turning is None:

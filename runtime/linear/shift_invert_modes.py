@@ -53,7 +53,7 @@ class LowestModes:
 
 
 def undamped_modes(pencil: Pencil, count: int) -> LowestModes:
-    """The `count` modes of smallest omega^2 of M and a symmetric K."""
+    """The `count` modes of smallest omega^2 of M and a symmetric K; says if one is missing."""
     n, counting = len(pencil), ModeCounter(pencil)
     wanted, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
     found, edge, values = ConvergedPairs.empty(n), np.inf, np.zeros(0)

@@ -141,7 +141,7 @@ def _unbalanced_error(
 
 
 def _moving_speeds(model: CompiledScene, q: Array, motions: list[Array]) -> tuple[str, ...]:
-    """Names of the speeds that move in some motions (nu,) at q.
+    """Names of the speeds that at least one of the motions, (nu,) each, moves noticeably at q.
 
     Of the independent speeds alone for mechanisms that are not too large.
     """

@@ -44,7 +44,7 @@ def build_certificate(result: Record, error: ErrorEstimate | None) -> Certificat
         flexible_bodies=model_range.model_ranges(result._flexible),
         spring_deflection=spring_deflection.stiffest_spring_deflection(result),
         failures=() if result.success else (result.message,),
-        model_risks=result._outside(),
+        model_risks=result._model_risks(),
         prior_risks=(
             *run.risks,
             *missed_feature_risks(result.model, run),

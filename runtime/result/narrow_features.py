@@ -239,7 +239,7 @@ def _enclosures_around(
 def _multi_variable_loads(
     model: CompiledScene,
 ) -> Iterator[tuple[ActiveExpression, Hinge | None, dict[str, float], list[str]]]:
-    """Active expressions of more than one coordinate that may have peaks.
+    """Loads and efforts that depend on several state variables and may have narrow peaks.
 
     Each with its hinge, constants and names.
     """

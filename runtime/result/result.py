@@ -60,7 +60,7 @@ class Result(PublicMembers, Record, NotebookDisplay):
 
     @property
     def trusted(self) -> bool:
-        """True if there is no objection to the result.
+        """True if the quality of the result was checked and no check objects.
 
         A success whose balances and estimated error (certify=True) are within bounds and whose
         models stayed within their range. `certificate.verdict(accuracy, balance)` accepts other

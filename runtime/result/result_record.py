@@ -168,7 +168,7 @@ class Record(FlexibleResults, ABC):
         notes, failures = self.trajectory.notes, self._observations.failures
         return tuple(dict.fromkeys((*map(str, risks), *notes, *failures)))
 
-    def _outside(self) -> tuple[Risk, ...]:
+    def _model_risks(self) -> tuple[Risk, ...]:
         """Findings about models of the scene that are outside their range in any run."""
         return tuple(short_beam_warnings(self.model.scene))
 

@@ -71,7 +71,7 @@ def linearize(
 
 
 def _table_rows(linear: Linear) -> tuple[list[str], list[list[str]]]:
-    """Table of the diagonals of M, C and K; for a first-order model the largest entries of A."""
+    """Header and rows: diagonals of M, C, K; for a first-order model the largest entry per row."""
     if linear.has_stiffness:
         diagonals = (matrix.diagonal() for matrix in (linear.M, linear.C, linear.K))
         numbers = ([f"{x:.5g}" for x in row] for row in zip(*diagonals, strict=True))

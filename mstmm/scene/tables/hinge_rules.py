@@ -132,7 +132,7 @@ def _resolve_axes(
 
 
 def _resolve_planar_axes(hinge: HingeKeys, problems: list[tuple[Location, str]]) -> dict[str, Any]:
-    """Resolve the normal under both its keys, and the direction of x in the plane."""
+    """Normal (keys `axis` and `normal`) and x direction of a planar hinge; defaults if absent."""
     normal = hinge.axis if hinge.normal is None else hinge.normal
     if hinge.normal is not None and hinge.axis not in (_Z_AXIS, hinge.normal):
         problems.append(

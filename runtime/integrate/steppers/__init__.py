@@ -1,9 +1,10 @@
 """Time-integration methods by name.
 
 A new method is one file with a function `tableau() -> Tableau`: `Tableau` itself for an explicit
-Runge-Kutta method, a class of `implicit` for an implicit one.  Inside the package its module name
-is added to `BUILT_IN`; outside it, call `register(my_tableau())` before the run.  Nothing else
-changes: the C loop reads the coefficients at run time.
+Runge-Kutta method, a class of `implicit_methods` for an implicit one.  Inside the package its
+module name is added to `EXPLICIT` or to `methods.IMPLICIT`, and to the lists of its properties
+beside them; outside it, call `register(my_tableau())` before the run.  The C loop reads the
+coefficients at run time.  CONTRIBUTING.md lists the tests to extend.
 """
 
 from __future__ import annotations

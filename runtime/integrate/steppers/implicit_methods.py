@@ -387,7 +387,7 @@ class Exponential(Implicit):
 
     def _check_consistency(self) -> None:
         if not self.max_unknowns > 0:
-            raise ValueError(f"tableau {self.name}: most_unknowns must be positive")
+            raise ValueError(f"tableau {self.name}: max_unknowns must be positive")
 
     def amplification(self, z: ArrayLike) -> NDArray[np.complex128]:
         """R(z) = exp(z) of one step on y' = lambda y with z = h lambda: exact."""

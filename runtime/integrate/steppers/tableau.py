@@ -107,7 +107,9 @@ class Tableau:
             if array.shape != shape:
                 raise ValueError(f"tableau {self.name}: {label} is {array.shape}, expected {shape}")
             if array.flags.writeable or not array.flags.c_contiguous:
-                raise ValueError(f"tableau {self.name}: {label} must come from frozen()")
+                raise ValueError(
+                    f"tableau {self.name}: {label} must be read-only; use to_read_only"
+                )
         self._check_consistency()
 
     def _check_consistency(self) -> None:

@@ -251,9 +251,9 @@ def _projected_matrices(
     return Matrices(mass, damping, stiffness)
 
 
-def _zero_cut_hinge_rows(model: CompiledScene, ways: Array) -> Array:
-    """`ways` (nu, n) with zero rows for cut hinges, whose loads act on their bodies instead."""
-    system, rows = model.packed_scene.system, ways.copy()
+def _zero_cut_hinge_rows(model: CompiledScene, motions: Array) -> Array:
+    """Motions (nu, n) with zero rows for cut hinges, whose loads act on their bodies instead."""
+    system, rows = model.packed_scene.system, motions.copy()
     for one in system.closures:
         first = int(system.first_indices["u"][one.frame])
         rows[first : first + system.body(one.frame).nu] = 0.0

@@ -107,9 +107,9 @@ class OneWayResult(Result):
             raise SceneError(f'"{body}": expected a one-way body: {", ".join(responses)}')
         return responses[body]
 
-    def _outside(self) -> tuple[Risk, ...]:
+    def _model_risks(self) -> tuple[Risk, ...]:
         """Findings of any result, and those about the elastic response."""
-        risks = (*super()._outside(), *self._one_way.risks, *_release_risks(self.model))
+        risks = (*super()._model_risks(), *self._one_way.risks, *_release_risks(self.model))
         if has_impacts(self):
             risks = (*risks, *map(_impact_risk, rigidified_bodies(self.model).one_way))
         return (*risks, *map(_coupling_risk, self.couplings.items()))

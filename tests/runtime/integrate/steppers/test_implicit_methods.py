@@ -137,7 +137,7 @@ def test_contradictory_coefficients_are_refused() -> None:
         (esdirk, {"C": to_read_only([0.0] * 6)}, "does not hold"),
         (esdirk, {"second": to_read_only(np.eye(6))}, "starts from later stages"),
         (newmark, {"beta_n": 0.0}, "positive"),
-        (get("exprb32"), {"most_unknowns": 0}, "positive"),
+        (get("exprb32"), {"max_unknowns": 0}, "positive"),
     ]
     for tableau, change, message in cases:
         with pytest.raises(ValueError, match=message):
