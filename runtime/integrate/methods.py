@@ -116,11 +116,11 @@ def method(name: str, **options: Any) -> Method:
     Raises SceneError for an option that the method does not have.
     """
     family = _family(require_word("method", name, "a name such as dop853"))
-    unknown = sorted(options.keys() - {f.name for f in fields(family)})
+    unknown = sorted(options.keys() - _option_names(family))
     if unknown:
-        owners = [f.__name__ for f in FAMILIES if unknown[0] in {x.name for x in fields(f)}]
-        expected = f"expected in mstmm.methods.{owners[-1]}" if owners else "unknown option"
-        raise SceneError(f'{unknown[0]}: method "{name}" has no such option; {expected}')
+        owners = [x for x in (*IMPLICIT, *_CLASSICAL) if unknown[0] in _option_names(_family(x))]
+        remedy = f"methods with it: {', '.join(owners)}" if owners else "no method has it"
+        raise SceneError(f'{unknown[0]}: method "{name or "auto"}" has no such option; {remedy}')
     return family(name, **options)
 
 
@@ -130,6 +130,10 @@ def to_method(given: str | Method) -> Method:
         require_word("method", given.name, "a name such as dop853")
         return given
     return method(require_word("method", given, "a name such as dop853, or one of mstmm.methods"))
+
+
+def _option_names(family: type[Method]) -> set[str]:
+    return {f.name for f in fields(family)}
 
 
 def _family(name: str) -> type[Method]:

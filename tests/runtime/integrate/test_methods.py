@@ -33,10 +33,10 @@ def test_defaults_are_those_of_the_settings_of_a_run() -> None:
 @pytest.mark.parametrize(
     ("name", "option", "owner"),
     [
-        ("dop853", "radius", "expected in mstmm.methods.GeneralizedAlpha"),
-        ("newmark", "radius", "expected in mstmm.methods.GeneralizedAlpha"),
-        ("dop853", "tangent", "expected in mstmm.methods.Implicit"),
-        ("genalpha", "scheme", "expected in mstmm.methods.ClassicalDiscreteTime"),
+        ("dop853", "radius", "methods with it: genalpha, dttmm"),
+        ("newmark", "radius", "methods with it: genalpha, dttmm"),
+        ("dop853", "tangent", "methods with it: rodas4"),
+        ("genalpha", "scheme", "methods with it: dttmm-classical"),
         ("genalpha", "rtol", "unknown option"),
     ],
 )

@@ -81,7 +81,7 @@ def test_contradictory_coefficients_are_refused() -> None:
         ({"A": to_read_only(np.eye(4))}, "not explicit"),
         ({"A": to_read_only(np.zeros((4, 3)))}, r"A is \(4, 3\), expected \(4, 4\)"),
         ({"dense": from_monomials(np.ones((5, 2)))}, "dense output differs from"),
-        ({"C": np.array([0.0, 0.5, 0.5, 1.0])}, "frozen"),
+        ({"C": np.array([0.0, 0.5, 0.5, 1.0])}, "to_read_only"),
     )
     for change, message in cases:
         with pytest.raises(ValueError, match=message):
