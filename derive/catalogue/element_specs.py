@@ -122,11 +122,7 @@ def shared_specs() -> list[ElementSpec]:
         plain(name="qr", title="sweep as least squares", kernels=_lower_kernels(qr_kernels())),
         plain(name="screw", title="transport across axial screws", kernels=screws),
         *(
-            plain(
-                name=f"link_{name}",
-                title=title,
-                kernels=_lower_kernels(link_kernels(name)),
-            )
+            plain(name=f"link_{name}", title=title, kernels=_lower_kernels(link_kernels(name)))
             for name, title in link_names().items()
         ),
         *(generic_spec(nu) for nu in range(MAX_SPEEDS + 1)),

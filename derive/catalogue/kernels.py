@@ -32,13 +32,7 @@ from ..equations import force_element as force_kernels
 from ..equations import tangent_position_loads as placed
 from ..equations import user_body as body_kernels
 from ..equations.constrained_directions import complement
-from ..equations.hinge import (
-    HingeMotion,
-    hinge_derivation,
-    hinge_pose,
-    hinge_quantities,
-    motion_of,
-)
+from ..equations.hinge import HingeMotion, hinge_derivation, hinge_pose, hinge_quantities, motion_of
 from ..equations.ldl_elimination import eliminate_factored, recover_factored
 from ..equations.links import axial, rotational
 from ..flexible import (

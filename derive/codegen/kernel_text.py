@@ -80,10 +80,7 @@ class KernelText:
     """
 
     def __init__(
-        self,
-        kernel: KernelIR,
-        alike: Sequence[tuple[str, int]] = (),
-        plain: Collection[str] = (),
+        self, kernel: KernelIR, alike: Sequence[tuple[str, int]] = (), plain: Collection[str] = ()
     ) -> None:
         self.kernel = kernel
         self.vector_loops = VectorLoops(kernel, alike) if alike else None

@@ -208,7 +208,7 @@ def rolling_drift() -> Derivation:
 _FLAT = sp.Rational(1, 10**3)
 #: Singular cases: (condition, failure code, message) by kernel.
 GUARDS: dict[str, tuple[tuple[sp.Basic, int, str], ...]] = {
-    "rolling": ((symbol("size", 1)[0, 0] > _FLAT, 1, "the disc lies flat on its plane"),),
+    "rolling": ((symbol("size", 1)[0, 0] > _FLAT, 1, "the disc lies flat on its plane"),)
 }
 
 #: Kernels of constraints, in their order.

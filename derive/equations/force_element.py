@@ -32,11 +32,7 @@ def relative_motion() -> tuple[tuple[Equation, ...], tuple[sp.MatrixSymbol, ...]
     equations = (
         Equation("relative position, F axes", x, a_f.T * (x_t - x_f)),
         Equation("angular velocity of F, F axes", spin, a_f.T * w_f),
-        Equation(
-            "relative rate, F axes",
-            v,
-            a_f.T * (v_t - v_f) - tilde(_explicit(spin)) * x,
-        ),
+        Equation("relative rate, F axes", v, a_f.T * (v_t - v_f) - tilde(_explicit(spin)) * x),
         Equation("relative rotation", rotation, a_f.T * a_t),
         Equation("relative angular velocity, F axes", w, a_f.T * (w_t - w_f)),
     )

@@ -98,9 +98,7 @@ def turning() -> Derivation:
         (
             Equation("angular velocity", rate, A.symbol * part(motion, 0)),
             Equation(
-                "angular acceleration",
-                second,
-                A.symbol * (part(motion, 3) + part(delta.symbol, 3)),
+                "angular acceleration", second, A.symbol * (part(motion, 3) + part(delta.symbol, 3))
             ),
         ),
     )
@@ -149,13 +147,7 @@ def power() -> Derivation:
             Quantity(w_k, "rad/s", "angular velocity, inertial axes"),
         ),
         (Quantity(total, "W", "power"),),
-        (
-            Equation(
-                "power",
-                total,
-                v_k.T * (axes * force) + w_k.T * (axes * moment),
-            ),
-        ),
+        (Equation("power", total, v_k.T * (axes * force) + w_k.T * (axes * moment)),),
     )
 
 
@@ -325,10 +317,7 @@ def transport() -> Derivation:
             Equation(
                 "X^T e",
                 load.symbol,
-                stack(
-                    push,
-                    R.symbol * part(E.symbol, 3) + tilde(column(SHIFT.symbol)) * push,
-                ),
+                stack(push, R.symbol * part(E.symbol, 3) + tilde(column(SHIFT.symbol)) * push),
             ),
         ),
     )

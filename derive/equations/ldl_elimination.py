@@ -118,9 +118,7 @@ def recover_factored(nu: int) -> Derivation:
         Equation("v", v, Triangular(factor.symbol, right_side, transposed=True)),
         Equation("udot = v - W X delta_I", rates.symbol, v - along_units),
         Equation(
-            "deviation of the body",
-            DELTA.symbol,
-            (carried - h.symbol * along_units) + h.symbol * v,
+            "deviation of the body", DELTA.symbol, (carried - h.symbol * along_units) + h.symbol * v
         ),
     )
     return Derivation(

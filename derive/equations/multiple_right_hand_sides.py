@@ -72,10 +72,7 @@ def factor(nu: int) -> Derivation:
                 Triangular(factored.symbol, scaled, transposed=True),
             ),
             Equation(
-                "S_Q = S - Y^T diag(d)^-1 Y",
-                reduced,
-                S.symbol - below.T * scaled,
-                symmetric=True,
+                "S_Q = S - Y^T diag(d)^-1 Y", reduced, S.symbol - below.T * scaled, symmetric=True
             ),
         )
     steps, transported = congruence("S_Q")

@@ -34,11 +34,7 @@ def component_rate(v: Matrix) -> Matrix:
     Points are fixed in body axes; the components of X0 and V0 change because the origin moves and
     because the axes turn under it.
     """
-    rates = {
-        X0: V0 - tilde(OMEGA) * X0,
-        V0: A0 - tilde(OMEGA) * V0,
-        OMEGA: OMEGADOT,
-    }
+    rates = {X0: V0 - tilde(OMEGA) * X0, V0: A0 - tilde(OMEGA) * V0, OMEGA: OMEGADOT}
     total = sp.zeros(*v.shape)
     for quantity, rate in rates.items():
         total += Matrix(v.jacobian(quantity)) * rate

@@ -247,10 +247,7 @@ def condense(
             Equation("e_Q", load, replace_rows(symbol("e_full", 6), tau.symbol, units)),
         ]
     else:
-        equations = [
-            Equation("S_Q = S", reduced, S.symbol),
-            Equation("e_Q = e", load, E.symbol),
-        ]
+        equations = [Equation("S_Q = S", reduced, S.symbol), Equation("e_Q = e", load, E.symbol)]
     steps, transported = congruence("S_Q")
     equations += [
         *steps,

@@ -130,9 +130,7 @@ def placed_carry() -> Derivation:
             Equation("by velocity", t_velocity, velocity * R.symbol.T),
             Equation("by angular velocity", t_spin, -(t_velocity * lever)),
             Equation(
-                "S_p [Th_p, Th_z]",
-                total,
-                sp.BlockMatrix([[t_turn, t_place, t_velocity, t_spin]]),
+                "S_p [Th_p, Th_z]", total, sp.BlockMatrix([[t_turn, t_place, t_velocity, t_spin]])
             ),
             Equation("S_p Th_p, by rows", s_th.symbol, total[:, :9].T),
             Equation("S_p Th_z, by rows", by_spin.symbol, total[:, 9:].T),
@@ -231,9 +229,7 @@ def placed_node() -> Derivation:
             Equation("H^T S_p", right.symbol, H.symbol.T * _ROWS_S.symbol.T + _OWN_ROWS.symbol.T),
             Equation("D^-1 H^T S_p", _GAIN.symbol, Solve(D.symbol, right.symbol)),
             Equation(
-                "S_p - V D^-1 H^T S_p",
-                without.symbol,
-                _ROWS_S.symbol - _GAIN.symbol.T * V.symbol.T,
+                "S_p - V D^-1 H^T S_p", without.symbol, _ROWS_S.symbol - _GAIN.symbol.T * V.symbol.T
             ),
         ),
         sources=SOURCES,

@@ -108,9 +108,7 @@ def outboard_motion() -> tuple[Equation, sp.BlockMatrix]:
     relative, velocity = tilde(column(W_REL.symbol)), tilde(column(V_REL.symbol))
     acceleration = linear - lever * rate - _spin_acceleration() * turn
     return Equation("change of the angular velocity", dw, R.symbol.T * turn), stack(
-        dw,
-        R.symbol.T * rate - relative * dw,
-        R.symbol.T * acceleration - 2 * (velocity * dw),
+        dw, R.symbol.T * rate - relative * dw, R.symbol.T * acceleration - 2 * (velocity * dw)
     )
 
 
@@ -217,9 +215,7 @@ def node() -> Derivation:
             Equation("H^T S", RIGHT.symbol, H.symbol.T * s + OWN_ROWS.symbol.T),
             Equation("D^-1 H^T S", GAIN.symbol, Solve(D.symbol, RIGHT.symbol)),
             Equation(
-                "S - V D^-1 H^T S",
-                without.symbol,
-                ROWS_S.symbol - GAIN.symbol.T * V.symbol.T,
+                "S - V D^-1 H^T S", without.symbol, ROWS_S.symbol - GAIN.symbol.T * V.symbol.T
             ),
         ),
         sources=SOURCES,

@@ -12,9 +12,7 @@ from .variable_size import SizedLowering
 
 
 def lower(
-    derivation: Derivation,
-    name: str,
-    guards: tuple[tuple[sp.Basic, int, str], ...] = (),
+    derivation: Derivation, name: str, guards: tuple[tuple[sp.Basic, int, str], ...] = ()
 ) -> KernelIR:
     """KernelIR of the derivation's definitions.
 

@@ -102,7 +102,7 @@ _EFFORTS = EachSpeed(
         _row("k"),
         call("loops.act", J="closure.J_A[6 * k]", tau="body.tau[k]", e="parent.e"),
         call("loops.act", J="closure.J_B[6 * k]", tau="body.tau[k]", e="outboard.e"),
-    ),
+    )
 )
 
 CLOSURES = Pass(
@@ -244,8 +244,7 @@ _ROWS_CONDENSED = ForEach(
 _MODAL_SOLUTION = (
     call("modal.recover", Gg="modes.gain", delta_I="body.delta", etadd="modes.etadd"),
     ForEach(
-        of="bent",
-        steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),),
+        of="bent", steps=(call("modal.row_answered", Y="bent.y", x="bent.x", etadd="modes.etadd"),)
     ),
     Copy(to="modes.udot", source="modes.etadd"),
     Add(to="modes.udot", source="modes.given", when="refined"),
@@ -259,8 +258,7 @@ _ROW_COUPLING = only(
     call("generic{free}.divide", F="hinge.F", y="pending.y", z="local.z"),
     call("generic{free}.answered", y="hinge.g", z="local.z", l="pending.known"),
     ForEach(
-        of="before",
-        steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),),
+        of="before", steps=(call("generic{free}.couple", y="before.y", z="local.z", L_ij="pair.L"),)
     ),
 )
 

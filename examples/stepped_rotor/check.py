@@ -21,10 +21,7 @@ RPM = 2 * np.pi / 60
 Array = NDArray[np.float64]
 
 #: Nelson and McVaugh (1976): whirl speeds in rpm where the spin is this part of them.
-PUBLISHED = {
-    1.0: (15470, 17159, 46612, 49983, 64752),
-    0.5: (15858, 16700, 47520, 49204, 69640),
-}
+PUBLISHED = {1.0: (15470, 17159, 46612, 49983, 64752), 0.5: (15858, 16700, 47520, 49204, 69640)}
 #: Their orthotropic bearings, N/m.
 ORTHOTROPIC = np.array([[3.503e7, -8.756e6], [-8.756e6, 3.503e7]])
 

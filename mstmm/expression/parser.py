@@ -331,8 +331,7 @@ class Parser:
         self._reduce_to_group()
         if not self._pending_operators or self._pending_operators[-1].op == "(":
             raise self.error(
-                "a comma only separates arguments of a function; write decimals with a point",
-                start,
+                "a comma only separates arguments of a function; write decimals with a point", start
             )
         self._pending_operators[-1].arguments += 1
 

@@ -121,12 +121,7 @@ class LoopingInterpreter(Interpreter):
     """Interpreter that runs through loops; arrays are flat row-major lists, outputs start at 0."""
 
     def __init__(
-        self,
-        kernel: KernelIR,
-        operations: Operations,
-        n: int,
-        inputs: Mapping[str, Any],
-        zero: Any,
+        self, kernel: KernelIR, operations: Operations, n: int, inputs: Mapping[str, Any], zero: Any
     ) -> None:
         super().__init__(kernel, operations, n)
         self.zero = zero

@@ -66,10 +66,7 @@ _MODES_PER_BODY = 24
 _ROWS_PER_BODY = 32
 
 #: Folders of the code that prints fused code; with structure and kernels they determine its text.
-PRINTER_FOLDERS = {
-    "mstmm": ("abi", "ir"),
-    "mstmm.derive": ("fuse", "codegen", "schedule"),
-}
+PRINTER_FOLDERS = {"mstmm": ("abi", "ir"), "mstmm.derive": ("fuse", "codegen", "schedule")}
 
 
 class Fusion:

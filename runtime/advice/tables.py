@@ -16,7 +16,7 @@ def summary_lines(advice: Advice) -> list[str]:
     lines = [
         f"{target}: {_model_text(advice)} by {advice.method}, {advice.setting}: error "
         f"{advice.error:.1e}{exceeded}, {format_time(advice.cpu_s)} CPU over "
-        f"{advice.comparison_text}",
+        f"{advice.comparison_text}"
     ]
     savings = [
         _saving_text(

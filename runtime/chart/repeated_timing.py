@@ -22,11 +22,7 @@ _ROUND_CPU_S, _MAX_CALLS = 5e-3, 5
 
 
 def repeat_timings(
-    points: list[Point],
-    models: list[Model],
-    rounds: int,
-    runs: Runs,
-    report: Callable[[str], None],
+    points: list[Point], models: list[Model], rounds: int, runs: Runs, report: Callable[[str], None]
 ) -> tuple[list[Point], int]:
     """Repeat the timing of points; return them, and how many missed at least one round.
 

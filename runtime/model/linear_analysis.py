@@ -93,11 +93,7 @@ class LinearAnalysis(DynamicsQueries):
         return self.linearize(q, u, t, friction=friction).modes(count, damped)
 
     def dynamic_stiffness_modes(
-        self,
-        count: int,
-        exact: BeamSelection = True,
-        q: ArrayLike | None = None,
-        t: float = 0.0,
+        self, count: int, exact: BeamSelection = True, q: ArrayLike | None = None, t: float = 0.0
     ) -> DynamicStiffnessModes:
         """The `count` slowest undamped modes at rest, with the dynamic stiffness of beams.
 

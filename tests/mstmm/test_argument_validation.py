@@ -35,10 +35,7 @@ OF_RESULTS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "report": (lambda r: r.report(3), "report 3: expected the name of a file"),
     "quantities": (lambda r: r.report("r.html", quantities=3), "quantities = 3: expected a list"),
     "file": (lambda r: r.save(3), "result file 3: expected the name of a file"),
-    "simplify": (
-        lambda r: mstmm.compile(r.model.scene, simplify=THREE),
-        "simplify = 3: expected",
-    ),
+    "simplify": (lambda r: mstmm.compile(r.model.scene, simplify=THREE), "simplify = 3: expected"),
     "certify": (lambda r: r.model.simulate(0.1, certify="yes"), "expected True or False"),
 }
 

@@ -31,9 +31,7 @@ def derivation(statement: BodyStatement) -> Derivation:
     motion = _motion_symbols(space, modes, letters)
     body_equations = equations_of_motion(body.moments, motion, _elastic_forces(body, motion))
     n = space.length(modes)
-    outputs = [
-        Quantity(sp.MatrixSymbol("U", n, n), space.state(modes).unit, "matrix, z_O = U z_I"),
-    ]
+    outputs = [Quantity(sp.MatrixSymbol("U", n, n), space.state(modes).unit, "matrix, z_O = U z_I")]
     if modes:
         outputs.append(Quantity(sp.MatrixSymbol("W", modes, n), "N", "modal rows, W z_I = 0"))
     return Derivation(

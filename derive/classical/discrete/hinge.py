@@ -158,10 +158,7 @@ def _elimination_equations(hinge: FlexibleHinge) -> tuple[Equation, ...]:
     if not free.cols:
         return (Equation("transfer matrix", transfer_symbol, carry, hinge.equation),)
     e, g = sp.MatrixSymbol("E", n_out, n_in), sp.MatrixSymbol("G", n_out, free.cols)
-    rows, gain = (
-        sp.MatrixSymbol("V", free.cols, n_out),
-        sp.MatrixSymbol("K", free.cols, n_in),
-    )
+    rows, gain = (sp.MatrixSymbol("V", free.cols, n_out), sp.MatrixSymbol("K", free.cols, n_in))
     return (
         Equation("carried state", e, carry, "", "z_O at x = 0"),
         Equation("free unknowns", g, free, "", "d z_O / d x, x = [own freedom; eta_O]"),

@@ -24,8 +24,7 @@ _RESULT_ENDING = ".nc"
 
 def view(
     what: Annotated[
-        str,
-        typer.Argument(metavar="SCENE|RESULT", help="Scene (.toml, .json) or result (.nc)."),
+        str, typer.Argument(metavar="SCENE|RESULT", help="Scene (.toml, .json) or result (.nc).")
     ],
     output: Annotated[
         list[str] | None,

@@ -92,8 +92,7 @@ class Limits(Table):
             )
         if self.stiffness > 0 or self.damping > 0:
             raise rules.problem(
-                "expected restitution or stiffness for a stop, found both; give one",
-                "restitution",
+                "expected restitution or stiffness for a stop, found both; give one", "restitution"
             )
         return self
 
@@ -179,7 +178,4 @@ class SpringLaw(Table):
     stiffness: Annotated[float, rules.number_rule("N/m", minimum=0)] = 0.0
     rest: Annotated[float, rules.number_rule("m", minimum=0)] = 0.0
     damping: Annotated[float, rules.number_rule("N s/m", minimum=0)] = 0.0
-    effort: Annotated[
-        Expression,
-        texts.expression_rule("a number or expression in N"),
-    ] = number(0)
+    effort: Annotated[Expression, texts.expression_rule("a number or expression in N")] = number(0)

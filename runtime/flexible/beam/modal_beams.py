@@ -58,8 +58,7 @@ class BeamBodies:
         key = repr((beam.model_copy(update={"name": ""}), conditions, support, sorted(idle)))
         if key not in self._cache:
             self._cache[key] = checked_result(
-                f'beam "{beam.name}"',
-                lambda: _beam_body(beam, data, conditions, support, idle),
+                f'beam "{beam.name}"', lambda: _beam_body(beam, data, conditions, support, idle)
             )
         body = self._cache[key]
         assert body.shapes is not None

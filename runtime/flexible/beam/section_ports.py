@@ -25,11 +25,7 @@ class BeamShapes(ShapeFields):
     """
 
     def __init__(
-        self,
-        data: BeamData,
-        modes: tuple[Mode, ...],
-        stiffening: bool,
-        frames: Mapping[str, Frame],
+        self, data: BeamData, modes: tuple[Mode, ...], stiffening: bool, frames: Mapping[str, Frame]
     ) -> None:
         super().__init__(data, modes)
         self.stiffening = stiffening

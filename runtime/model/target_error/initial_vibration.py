@@ -141,10 +141,7 @@ def initial_vibration(
     except np.linalg.LinAlgError:
         raise NumericalFailure(f"the motions at t = {t:.9g} s are not finite") from None
     fast = np.abs(roots) * span > _SLOW_RADIANS
-    fast_rates, amplitudes = (
-        np.abs(roots[fast]),
-        np.abs(vectors[:, fast] * participations[fast]),
-    )
+    fast_rates, amplitudes = (np.abs(roots[fast]), np.abs(vectors[:, fast] * participations[fast]))
     amplitudes /= fast_rates
     q_parts = _relative_amplitudes(amplitudes[: len(q)], model.coordinate_layout.q_by_unit)
     u_parts = _relative_amplitudes(amplitudes[len(q) :], model.coordinate_layout.u_by_unit)

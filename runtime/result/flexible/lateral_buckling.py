@@ -39,13 +39,7 @@ def _distances_to_ends(length: float, held: float) -> list[float]:
 
 
 def lateral_load_ratio(
-    body: ModalBody,
-    x: Array,
-    weights: Array,
-    held: float,
-    line: float,
-    force: Array,
-    moment: Array,
+    body: ModalBody, x: Array, weights: Array, held: float, line: float, force: Array, moment: Array
 ) -> float | None:
     """Largest ratio of load to buckling load in directions without shape functions.
 

@@ -226,11 +226,7 @@ def _load_ratio_bounds(
 
 
 def _section_estimates(
-    flexible: FlexibleBodies,
-    name: str,
-    some: NDArray[np.int64],
-    line: float | None,
-    slope: float,
+    flexible: FlexibleBodies, name: str, some: NDArray[np.int64], line: float | None, slope: float
 ) -> tuple[float | None, float | None, UnshapedDeformation | None]:
     """Estimates from the true section loads of a beam.
 

@@ -111,12 +111,7 @@ class SceneView(NotebookDisplay):
         )
 
 
-def make_view(
-    run: Record,
-    title: str,
-    trails: Sequence[str],
-    speed: float | None,
-) -> SceneView:
+def make_view(run: Record, title: str, trails: Sequence[str], speed: float | None) -> SceneView:
     """Create the view of a run; see `Result.view`."""
     trails = require_texts("trails", trails, "rod2.tip")
     title = optional_text("title", title) or ""

@@ -369,9 +369,7 @@ def _free_alone(statement: HingeStatement, index: int) -> bool:
 
 
 @pytest.mark.parametrize("mutation", _mutations(), ids=str)
-def test_a_flipped_sign_in_a_hinge_premise_is_found(
-    mutation: tuple[str, Flip],
-) -> None:
+def test_a_flipped_sign_in_a_hinge_premise_is_found(mutation: tuple[str, Flip]) -> None:
     name, flip = mutation
     statement = STATEMENTS[name]
     changed = dataclasses.replace(statement, premises=flipped(statement.premises, flip))

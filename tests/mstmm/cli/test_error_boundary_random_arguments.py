@@ -37,10 +37,7 @@ arguments = st.one_of(
         st.sampled_from(COMMANDS).map(lambda name: [name]),
         st.lists(st.sampled_from([*OPTIONS, *WORDS]), max_size=5),
     ),
-    st.tuples(
-        st.just(SIMULATE),
-        st.lists(st.sampled_from([*OPTIONS[:14], *WORDS]), max_size=4),
-    ),
+    st.tuples(st.just(SIMULATE), st.lists(st.sampled_from([*OPTIONS[:14], *WORDS]), max_size=4)),
     st.tuples(
         st.sampled_from(COMMANDS).map(lambda name: [name]),
         st.lists(st.text(max_size=12), max_size=3),

@@ -28,11 +28,7 @@ def test_references_run_without_the_engine() -> None:
         "assert not loaded, loaded\n"
     )
     run = subprocess.run(
-        [sys.executable, "-c", imports + use],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", imports + use], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert run.returncode == 0, run.stderr
 

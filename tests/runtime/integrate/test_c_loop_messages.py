@@ -66,10 +66,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"method": "auto", "step": 0.1}, 'method "auto" chooses its steps'),
     ({"method": "scipy-RK45", "step": 0.1}, 'method "scipy-RK45" chooses its own steps'),
     ({"method": "dttmm-classical"}, 'method "dttmm-classical" takes fixed steps'),
-    (
-        {"method": ClassicalDiscreteTime(scheme="foo"), "step": 0.1},
-        'scheme "foo" does not exist',
-    ),
+    ({"method": ClassicalDiscreteTime(scheme="foo"), "step": 0.1}, 'scheme "foo" does not exist'),
 ]
 
 

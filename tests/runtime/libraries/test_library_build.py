@@ -78,10 +78,7 @@ def test_sixteen_want_the_same(
 
 
 def test_sixteen_want_five_and_some_are_killed(
-    cache_folder: Path,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    rng: np.random.Generator,
+    cache_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator
 ) -> None:
     """Killed at moments drawn afresh, while compiling, waiting, renaming, or before."""
     monkeypatch.setenv("CC", str(false_compiler(tmp_path, 'sleep 0.05\nexec $REAL "$@"')))

@@ -90,8 +90,7 @@ def test_two_balls(when: str, kept: set[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("when", "kept"),
-    [("a.x > b.x - 0.2", {"x"}), ("a.x > 0.6", set()), ("ra.q > 0.6", set())],
+    ("when", "kept"), [("a.x > b.x - 0.2", {"x"}), ("a.x > 0.6", set()), ("ra.q > 0.6", set())]
 )
 def test_carts_on_a_rail(when: str, kept: set[str]) -> None:
     rails = [hinge("ra", "prismatic", "ground", "a", 1.0, axis=[1, 0, 0]),

@@ -296,8 +296,7 @@ def _hinge(chain: Chain, k: int, load: _Affine) -> tuple[_Affine, _Affine]:
     free, turned = _free_directions(chain, link)
     pivot = mpmath.inverse(free.T * load.matrix * free)
     through = _Affine(
-        -pivot * (free.T * load.matrix + turned),
-        -pivot * (free.T * load(gap) - link.values["tau"]),
+        -pivot * (free.T * load.matrix + turned), -pivot * (free.T * load(gap) - link.values["tau"])
     )
     carried = _Affine(one + free * through.matrix, gap + free * through.constant)
     return carried, _Affine(load.matrix * carried.matrix, load(carried.constant))

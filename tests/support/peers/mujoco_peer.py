@@ -86,11 +86,7 @@ class MujocoPeer:
         entries = [tensor[i] for i in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
         center = hinge.Rp.T @ (body.center - hinge.rp)
         ElementTree.SubElement(
-            node,
-            "inertial",
-            pos=_text(center),
-            mass=_text(body.mass),
-            fullinertia=_text(entries),
+            node, "inertial", pos=_text(center), mass=_text(body.mass), fullinertia=_text(entries)
         )
         for k, i in np.ndindex(len(self.meeting), 2):
             number, end, _ = tree.end(self.meeting[k][i])

@@ -17,10 +17,7 @@ from tests.support.scenes import elastic_bar as bar
 
 Array = NDArray[np.float64]
 
-ENDS = {
-    "root": {"plane": [1, 0, 0, 0.0], "position": [0, 0, 0]},
-    "tip": {"plane": [1, 0, 0, 0.8]},
-}
+ENDS = {"root": {"plane": [1, 0, 0, 0.0], "position": [0, 0, 0]}, "tip": {"plane": [1, 0, 0, 0.8]}}
 GRAVITY = np.array([1.0, -2.0, 3.0])
 
 

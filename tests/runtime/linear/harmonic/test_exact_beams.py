@@ -270,12 +270,7 @@ BLOWN = {"on": "boom", "force_per_length": [0, "wind", 0]}
         ({}, {"load": [LOAD | {"force": [-3, 0, 0]}]}, {}, "under tension or compression at rest"),
         ({}, {}, {"modal": 0.1}, "damping ratios refer to normal modes"),
         ({}, {}, {"inputs": ["ground.acceleration.y"]}, 'acts along the whole beam "boom"'),
-        (
-            {},
-            {"input": [WIND], "load": [BLOWN]},
-            {"inputs": ["wind"]},
-            '"wind" acts along',
-        ),
+        ({}, {"input": [WIND], "load": [BLOWN]}, {"inputs": ["wind"]}, '"wind" acts along'),
         ({}, {}, {"outputs": None}, "all coordinates are those of beam shapes; give outputs"),
     ],
 )

@@ -191,10 +191,7 @@ def test_shear_counts_as_much_as_its_shape_moves() -> None:
         ({"tail": 0.2}, "miss 20% of its bending energy.*static\\+fixed-interface"),
         ({"gamma": (-0.95, 0.0)}, "buckling load"),
         ({"shear": 0.2}, "too short for a beam without shear"),
-        (
-            {"said": ("basis of blade is poor; take another",)},
-            "^basis of blade is poor; take",
-        ),
+        ({"said": ("basis of blade is poor; take another",)}, "^basis of blade is poor; take"),
     ],
 )
 def test_each_limit_has_its_warning(changes: dict[str, Any], words: str) -> None:
