@@ -103,7 +103,7 @@ def _wrench_of_ends(ends: tuple[Array, Array], numbers: tuple[float, ...], eleme
                "w": POINT_COLUMNS["angular_velocity"]}  # fmt: skip
     for letter, end in zip("FT", ends, strict=True):
         inputs[f"A_{letter}"] = end[is_finite, 15:24].reshape(-1, 3, 3)
-        inputs |= {f"{name}_{letter}": end[is_finite, place] for name, place in columns.items()}
+        inputs |= {f"{name}_{letter}": end[is_finite, column] for name, column in columns.items()}
     outputs = numpy_kernels.evaluate(_wrench_kernel(element), inputs)
     loads = np.full((len(is_finite), 6), np.nan)
     loads[is_finite] = np.hstack([outputs["F"], outputs["M"]])

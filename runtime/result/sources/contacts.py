@@ -65,14 +65,14 @@ def find_pulling_contacts(result: Record) -> Iterator[Risk]:
             )  # fmt: skip
 
 
-def _load_rounding(result: Record, one: Constraint, loads: dict[str, Array]) -> float:
+def _load_rounding(result: Record, constraint: Constraint, loads: dict[str, Array]) -> float:
     """Largest load (N) that is rounding."""
     energy = result.quantity("energy.kinetic").values
     largest = max(float(np.nanmax(np.abs(load), initial=0.0)) for load in loads.values())
-    assert one.radius is not None
+    assert constraint.radius is not None
     return (
         _LOAD_ROUNDING * largest
-        + _ENERGY_ROUNDING * float(np.nanmax(energy, initial=0.0)) / one.radius
+        + _ENERGY_ROUNDING * float(np.nanmax(energy, initial=0.0)) / constraint.radius
     )
 
 
