@@ -53,8 +53,8 @@ def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
     else:
         yield information(
             "stability-unknown", RUN,
-            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
-            "nothing pushes back", "look at the slowest modes, modes(count=...)",
+            f"more than {_ALL_MOTIONS} coordinates: not examined for unstable or unrestrained "
+            "motions", "compute the lowest modes, modes(count=...)",
         )  # fmt: skip
 
 

@@ -174,7 +174,7 @@ def _read_floats(data: Any, name: str) -> Array:
 def _require_number(value: Any) -> Any:
     """Require a number, a bool or None, and return it."""
     if value is not None and not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} stands where a number was")
+        raise TypeError(f"{value!r} found, expected a number")
     return value
 
 

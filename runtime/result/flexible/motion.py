@@ -63,7 +63,7 @@ class Motion:
     @property
     def shapes(self) -> BeamShapes:
         """Shape functions along the axis of a beam; SceneError for a body without any."""
-        return shapes_of(self.body, "what is along its axis")
+        return shapes_of(self.body, "a quantity along its axis")
 
     # --- floating frame in its own axes ---------------------------------------------------------
 
@@ -109,8 +109,8 @@ def shapes_of(body: ModalBody, what: str) -> BeamShapes:
     """Shape functions of a beam along its axis; SceneError for a body without an axis."""
     if body.shapes is None:
         raise SceneError(
-            f'"{body.name}": {what} is known along beams; this body is elastic by its matrices: '
-            "ask for the position of its ends and for modal_energy instead"
+            f'"{body.name}": {what} exists along beams only; for this elastic body use '
+            "the position of its ends and modal_energy"
         )
     return body.shapes
 
@@ -126,7 +126,7 @@ def checked_stations(body: ModalBody, x: ArrayLike, what: str) -> Array:
     )
     if is_off_beam.any():
         raise SceneError(
-            f'{what} of "{body.name}": x = {positions[is_off_beam][0]:g} m lies off the beam; '
+            f'{what} of "{body.name}": x = {positions[is_off_beam][0]:g} m is not on the beam; '
             f"expected 0 to {length:g} m"
         )
     return np.asarray(np.clip(positions, 0.0, length))

@@ -161,7 +161,7 @@ def draw_deflections(
     axis.add_collection(LineCollection(curves, colors=colours(norm(times)), linewidths=1.6))
     axis.autoscale_view()
     axis.margins(x=0.01)
-    axis.set_xlabel("place along the beam in m")
+    axis.set_xlabel("position along the beam in m")
     axis.set_ylabel(f"{name} in m")
     _draw_colour_bar(figure, axis, colours, norm)
 

@@ -127,8 +127,8 @@ class FlexibleResults:
         flexible, name = self._flexible, motion.body.name
         if name in flexible.unbalanced:
             raise SceneError(
-                f'"{name}": loads of a loop on its ends are those of the rigid run, which do not '
-                "balance its vibration, so that no equilibrium tells loads of its sections; take "
+                f'"{name}": loop loads on its ends are those of the rigid run, which do not '
+                "balance its vibration, so that section loads do not follow from equilibrium; use "
                 'source = "shapes" of bending_moment and axial_force, or model = "flexible"'
             )
         return section_loads(

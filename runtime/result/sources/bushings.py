@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 #: Quantities of a bushing: loads in inertial axes, deflections in its own.
 BUSHING_QUANTITIES = {
     "force": QuantityKind("N", "force on the end `to`", XYZ, ("fx", "fy", "fz")),
-    "moment": QuantityKind("N*m", "moment on the end `to`, at its place", XYZ, ("mx", "my", "mz")),
-    "deflection": QuantityKind(
-        "m", "motion of the end `to` from its place at rest, own axes", XYZ, ()
+    "moment": QuantityKind(
+        "N*m", "moment on the end `to`, about its point", XYZ, ("mx", "my", "mz")
     ),
+    "deflection": QuantityKind("m", "displacement of the end `to` from rest, own axes", XYZ, ()),
     "turn": QuantityKind("rad", "rotation vector of the end `to` from rest, own axes", XYZ, ()),
 }
 

@@ -50,7 +50,7 @@ def add_constraint(table: Table, observed: Observations, constraint: Constraint)
     meaning = "which pushes the ends apart" if constraint.type == DISTANCE else "along the normal"
     table.scalar(f"{name}.load", "N", f"load, {meaning},", load, owner=owner)
     if constraint.type == ROLLING:
-        table.scalar(f"{name}.friction", "N", "friction against slip", friction, owner=owner)
+        table.scalar(f"{name}.friction", "N", "friction force", friction, owner=owner)
 
 
 def add_coupling(table: Table, observed: Observations, name: str) -> None:
