@@ -105,9 +105,7 @@ def _hinge_kind(
         return kind, None
     if not laws:
         if not on_ground:
-            raise unsupported_error(
-                label, f"the hinge constrains nothing there; {_SUPPORTED_HINGES}"
-            )
+            raise unsupported_error(label, f"this hinge has no constraints; {_SUPPORTED_HINGES}")
         return FREE, None
     if len(laws) != 1 or laws[0].law.kernel != "six":
         raise unsupported_error(label, "its friction has no matrix")

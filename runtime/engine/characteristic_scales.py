@@ -54,7 +54,7 @@ def scene_length(model: HasScales) -> float:
     positions += [chain.position for chain in scene.chain]
     for body in (*scene.body, *(inner_body for chain in scene.chain for inner_body in chain.body)):
         positions += [body.center_of_mass, *(end.position for end in body.ends.values())]
-    lengths = [float(np.linalg.norm(place)) for place in positions]
+    lengths = [float(np.linalg.norm(position)) for position in positions]
     lengths += [radius_of_gyration(body) for body in model.flexible_bodies.values()]
     length = max(lengths, default=0.0)
     rigid = [body for body in scene.bodies.by_name.values() if hasattr(body, "inertia")]

@@ -242,12 +242,12 @@ class CompiledScene:
 
 
 def _unpickle(
-    kind: type[CompiledScene], scene: Scene, asked: CompileOptions, fused: bool
+    kind: type[CompiledScene], scene: Scene, options: CompileOptions, fused: bool
 ) -> CompiledScene:
     """Restore a pickled model, with its fused code if the local cache contains it."""
     known, definitions = kernel_store.load_known(kernel_store.required_types(scene))
     scene.check_types(definitions)
-    model = kind(scene, known, *asked)
+    model = kind(scene, known, *options)
     if fused:
         model.fusion.find()
     return model

@@ -36,11 +36,13 @@ def with_held_inputs(packed: PackedScene, names: Sequence[str], t: float) -> Pac
 
     They are appended to the memory with their values at t (s) and may be set between steps.
     """
-    system, places = packed.system, list(packed.system.held_inputs.memory_indices)
+    system, memory_indices = packed.system, list(packed.system.held_inputs.memory_indices)
     start = [packed.user_scene.channels[name].value(t) for name in names]
     for k, name in enumerate(names):
-        places[packed.layout.inputs[name]] = system.n_memory + k
-    held = HeldInputs(system.held_inputs.first, tuple(places), (*system.held_inputs.start, *start))
+        memory_indices[packed.layout.inputs[name]] = system.n_memory + k
+    held = HeldInputs(
+        system.held_inputs.first, tuple(memory_indices), (*system.held_inputs.start, *start)
+    )
     system_with_memory = replace(system, held_inputs=held, n_memory=system.n_memory + len(names))
     renewed_packed = _with_new_records(packed, system_with_memory)
     renewed_packed.held_input_names = packed.held_input_names | set(names)

@@ -32,14 +32,14 @@ class LiveInputs:
         self.indices: NDArray[np.int32] = np.full(
             (len(inputs), NUMBERS_PER_PIECE), -1, dtype=np.int32
         )
-        for entry, place in read:
-            self.indices[entry // NUMBERS_PER_PIECE, entry % NUMBERS_PER_PIECE] = place
+        for entry, memory_index in read:
+            self.indices[entry // NUMBERS_PER_PIECE, entry % NUMBERS_PER_PIECE] = memory_index
         self._varying = [
             i for i, channel in enumerate(inputs) if channel.varies and (self.indices[i] >= 0).any()
         ]
         self._stored = [
-            (i, place) for i, place in enumerate(system.held_inputs.memory_indices)
-            if place >= 0 and (self.indices[i] >= 0).any()
+            (i, memory_index) for i, memory_index in enumerate(system.held_inputs.memory_indices)
+            if memory_index >= 0 and (self.indices[i] >= 0).any()
         ]  # fmt: skip
 
     @property
@@ -50,9 +50,11 @@ class LiveInputs:
     def numbers_in_run(self, p: Array, t: float, memory: Array) -> Array:
         """Numbers p (np,) at time t (s) of a run, with stored inputs from its `memory`."""
         numbers = self.numbers_at(p, np.array([t])).reshape(-1).copy()
-        for i, place in self._stored:
+        for i, memory_index in self._stored:
             is_read = self.indices[i] >= 0
-            pieces = np.where(np.arange(NUMBERS_PER_PIECE) == _VALUE_INDEX, memory[place], 0.0)
+            pieces = np.where(
+                np.arange(NUMBERS_PER_PIECE) == _VALUE_INDEX, memory[memory_index], 0.0
+            )
             numbers[self.indices[i, is_read]] = pieces[is_read]
         return numbers
 

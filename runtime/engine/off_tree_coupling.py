@@ -73,11 +73,11 @@ class OffTreeCoupling:
         ]
         arrays: dict[str, tuple[str, Sequence[Any]]] = {
             "bodies": ("int[]", self.bodies),
-            "efforts": ("int64_t[]", [place for place, _ in self.efforts]),
+            "efforts": ("int64_t[]", [tree_index for tree_index, _ in self.efforts]),
             "speeds": ("int[]", [speed for _, speed in self.efforts]),
             "rows": ("mstmm_coupled_row[]", self.rows),
             "group": ("int[]", groups.tolist()), "rank": ("int[]", self.ranks.tolist()),
-            "unit": ("int64_t[]", [place for group_list in pass_units for place in group_list]),
+            "unit": ("int64_t[]", [index for group_list in pass_units for index in group_list]),
             "first_unit": ("int[]", _list_starts(pass_units)),
         }  # fmt: skip
         for name, lists in (
@@ -212,7 +212,9 @@ def _breadth_first(start: int, near: Mapping[int, set[int]]) -> list[int]:
     """Groups connected with `start` in breadth-first order, fewest neighbours first."""
     ordered, visited = [start], {start}
     for name in ordered:
-        ordered += sorted(near[name] - visited, key=lambda other: (len(near[other]), other))
+        ordered += sorted(
+            near[name] - visited, key=lambda neighbour: (len(near[neighbour]), neighbour)
+        )
         visited |= near[name]
     return ordered
 
@@ -242,11 +244,17 @@ def _find_passes(
 def _branch_of_bodies(system: System) -> list[int]:
     """First movable body on the path from the ground to each body, or `GROUND`."""
     branches = list[int]()
-    is_immobile = system.rows(lambda one: not one.nu and one.modal is None and one.section is None)
-    for place, parent in enumerate(system.parents.tolist()):
+    is_immobile = system.rows(
+        lambda body: not body.nu and body.modal is None and body.section is None
+    )
+    for tree_index, parent in enumerate(system.parents.tolist()):
         is_parent_fixed = parent == GROUND or branches[parent] == GROUND
         branches.append(
-            branches[parent] if not is_parent_fixed else GROUND if is_immobile[place] else place
+            branches[parent]
+            if not is_parent_fixed
+            else GROUND
+            if is_immobile[tree_index]
+            else tree_index
         )
     return branches
 
@@ -254,12 +262,12 @@ def _branch_of_bodies(system: System) -> list[int]:
 def _speeds_by_group(system: System, group: Mapping[int, int]) -> dict[int, list[int]]:
     """Speeds by group; every body belongs to one group."""
     speeds_found, first = dict[int, list[int]](), system.first_indices["u"].tolist()
-    speed_counts = system.rows(lambda one: one.nu).tolist()
-    is_flexible = system.rows(lambda one: one.modal is not None)
-    for place, name in group.items():
+    speed_counts = system.rows(lambda body: body.nu).tolist()
+    is_flexible = system.rows(lambda body: body.modal is not None)
+    for tree_index, name in group.items():
         own_speeds = speeds_found.setdefault(name, [])
-        own_speeds += range(first[place], first[place] + speed_counts[place])
-        if is_flexible[place] and (modal := system.body(place).modal):
+        own_speeds += range(first[tree_index], first[tree_index] + speed_counts[tree_index])
+        if is_flexible[tree_index] and (modal := system.body(tree_index).modal):
             own_speeds += range(modal.u, modal.u + modal.n)
     return speeds_found
 
@@ -276,13 +284,15 @@ def _effort_unknowns(engine: LoopedEngine) -> Iterator[tuple[int, int]]:
     first, loops = packed.system.first_indices["u"], packed.written.loops
     frames = {coupling.frame for coupling in packed.system.closures}
     coupled_places = (
-        {place for coupling in loops.couplings for place in coupling.columns} if loops else set()
+        {tree_index for coupling in loops.couplings for tree_index in coupling.columns}
+        if loops
+        else set()
     )
-    for place in sorted(coupled_places - frames):
-        body = model.bodies[place]
+    for tree_index in sorted(coupled_places - frames):
+        body = model.bodies[tree_index]
         first_effort = body.block + lib.MSTMM_BLOCK_FIXED + lib.MSTMM_SPEED_TAU * body.nu
         for k in range(body.nu):
-            yield int(first_effort) + k, int(first[place]) + k
+            yield int(first_effort) + k, int(first[tree_index]) + k
 
 
 def _loop_unknowns(engine: LoopedEngine) -> list[tuple[int, int, int, int]]:

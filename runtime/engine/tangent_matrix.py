@@ -228,10 +228,10 @@ def _lay_out_tangent(engine: LoopedEngine) -> int:
     packed = engine.packed
     count = int(engine.lib.mstmm_tangent_lay(packed.model))
     if count < 0:
-        place = -1 - count
-        force = place - packed.system.count
+        failed_index = -1 - count
+        force = failed_index - packed.system.count
         if force < 0:
-            culprit = f'"{engine.hinge_name(place)}" or its body'
+            culprit = f'"{engine.hinge_name(failed_index)}" or its body'
         else:
             culprit = f'"{packed.scene.forces[force].name}"'
         raise SceneError(

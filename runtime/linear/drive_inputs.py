@@ -59,7 +59,7 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
     Names are such as "platform.displacement", "platform.displacement_rate" and
     "platform.displacement_acceleration".
     """
-    found = dict[str, Motion]()
+    motions_by_name = dict[str, Motion]()
     for slots, k, _ in _driven(model):
         if slots.rates_are_speeds:
             unit, speed = slots.u_units[k], slots.u_names[k]
@@ -69,15 +69,15 @@ def motions(model: CompiledScene) -> dict[str, Motion]:
                 (acceleration_name(speed), rate_unit(unit)),
             )
             for order, (name, of) in enumerate(named):
-                found[f"{slots.name}.{name}"] = Motion(of, slots.u + k, order)
-    return found
+                motions_by_name[f"{slots.name}.{name}"] = Motion(of, slots.u + k, order)
+    return motions_by_name
 
 
 def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]]:
     """Yield (slots of the hinge, index of its coordinate, drive) of all driven coordinates."""
     packed = model.packed_scene
-    for place, k in packed.system.driven:
-        number = packed.topology.scene_indices(place)[1]
+    for tree_index, k in packed.system.driven:
+        number = packed.topology.scene_indices(tree_index)[1]
         drive = (packed.scene.hinges[number].drive or ())[k]
         if drive is not None:
             yield model.coordinate_layout.slots(number), k, drive
@@ -86,7 +86,9 @@ def _driven(model: CompiledScene) -> Iterator[tuple[HingeSlots, int, Expression]
 def accelerations(model: CompiledScene, moves: DriveFactors) -> list[str]:
     """Names of the accelerations of the drives in `moves`."""
     speeds = {speed for speed, _ in moves}
-    return [x for x, one in motions(model).items() if one.order == 2 and one.speed in speeds]
+    return [
+        x for x, motion in motions(model).items() if motion.order == 2 and motion.speed in speeds
+    ]
 
 
 def coordinate(model: CompiledScene, speed: int) -> str:
@@ -100,9 +102,9 @@ def followers(model: CompiledScene, name: str, t: float) -> DriveFactors:
 
     Raises SceneError where a slope depends on time.
     """
-    found, channels = dict[int, float](), model.scene.channels
+    factors, channels = dict[int, float](), model.scene.channels
     for slots, k, drive in _driven(model):
-        names = [one.text for one in drive.names]
+        names = [expression_name.text for expression_name in drive.names]
         if name not in names:
             continue
         if not slots.rates_are_speeds or not all(
@@ -113,9 +115,13 @@ def followers(model: CompiledScene, name: str, t: float) -> DriveFactors:
                 "on time; use the motion of the drive itself as the input, or keep the input "
                 "constant"
             )
-        rule = expression_derivatives(drive, lambda one: channels[one.text].value(t))
-        found[slots.u + k] = sum(slope for one, slope in rule.items() if one.text == name)
-    return tuple(found.items())
+        rule = expression_derivatives(
+            drive, lambda expression_name: channels[expression_name.text].value(t)
+        )
+        factors[slots.u + k] = sum(
+            slope for expression_name, slope in rule.items() if expression_name.text == name
+        )
+    return tuple(factors.items())
 
 
 def drive_columns(engine: LoopedEngine, state: State, moves: DriveFactors) -> Columns:
@@ -135,7 +141,7 @@ def residual_derivatives(engine: LoopedEngine, state: State, along: Array) -> Co
     engine = _undriven(engine)
     tangent, still = TangentMatrix(engine), np.zeros(engine.nu)
     moved, at_rest = tangent.rates(state.q, along), np.zeros(engine.nq)
-    for speed in (int(first[place]) + k for place, k in driven):
+    for speed in (int(first[tree_index]) + k for tree_index, k in driven):
         slots = engine.packed.layout.hinge_of_speed(speed)
         moved[slots.q + speed - slots.u] = along[speed]
     tangent.residual(state.t, state.q, state.u, state.udot)

@@ -44,9 +44,9 @@ def kinetic_shares(model: CompiledScene, q: Array, speeds: NDArray[Any]) -> dict
     energies = np.zeros((speeds.shape[1], engine.packed.topology.count))
     for part in parts:
         energies += engine.kinetic_energies(q, np.ascontiguousarray(part.T))
-    frames = {one.frame for one in engine.packed.system.closures}
-    bodies = [place for place in range(energies.shape[1]) if place not in frames]
-    names = [engine.body_name(place).partition("/")[0] for place in bodies]
+    frames = {closure.frame for closure in engine.packed.system.closures}
+    bodies = [tree_index for tree_index in range(energies.shape[1]) if tree_index not in frames]
+    names = [engine.body_name(tree_index).partition("/")[0] for tree_index in bodies]
     return _parts(names, energies[:, bodies].T)
 
 
@@ -89,10 +89,10 @@ def _modal_stiffness_product(model: CompiledScene, x: NDArray[Any]) -> NDArray[A
 
 def _parts(names: Iterable[str], energies: Array) -> dict[str, Array]:
     """Sums of rows (k,) by name relative to the total; nan where the total is zero."""
-    found: dict[str, Array] = {}
+    parts: dict[str, Array] = {}
     for name, row in zip(names, energies, strict=True):
-        found[name] = found[name] + row if name in found else row
+        parts[name] = parts[name] + row if name in parts else row
     total = energies.sum(axis=0)
     with np.errstate(all="ignore"):
         return {name: np.where(np.abs(total) > 0, row / total, np.nan)
-                for name, row in found.items()}  # fmt: skip
+                for name, row in parts.items()}  # fmt: skip

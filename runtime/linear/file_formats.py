@@ -98,10 +98,10 @@ def save(given: str | Path, dataset: Callable[[], Any], rows: Iterator[tuple[str
     ending = path.suffix.lower()
     if ending not in (".nc", ".csv"):
         raise SceneError(f'file "{path}": expected a name that ends in .nc or .csv')
-    made = dataset() if ending == ".nc" else None
+    built_dataset = dataset() if ending == ".nc" else None
     with replace_atomically(path) as temporary:
-        if made is not None:
-            made.to_netcdf(temporary, engine="h5netcdf")
+        if built_dataset is not None:
+            built_dataset.to_netcdf(temporary, engine="h5netcdf")
             seal(temporary)
         else:
             with temporary.open("w", newline="", encoding="utf-8") as file:

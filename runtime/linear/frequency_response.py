@@ -215,13 +215,13 @@ def frequency_response(
             yield from unshaped_response_risks(linear, pushes, frequencies, respond)
 
     def respond(of: LinearEquations, by: Sequence[Channel], at: Array) -> tuple[Complex, Array]:
-        read = outputs_of(of, [one.name for one in shown])
+        read = outputs_of(of, [quantity.name for quantity in shown])
         ratio = modal if isinstance(modal, (int, float)) else 0.0
         return _Sweep(of, by, read, structural, ratio, None).values_and_rounding(at)
 
     return FrequencyResponse(
-        frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
-        tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+        frequencies, tuple(entry.name for entry in pushes), tuple(entry.name for entry in shown),
+        tuple(entry.unit for entry in pushes), tuple(entry.unit for entry in shown), values,
         DeferredRisks(find_risks),
     )  # fmt: skip
 
@@ -234,18 +234,18 @@ def _ratio(output: str, pushed: str) -> str:
 def angular_frequencies(omega: ArrayLike) -> Array:
     """Validated angular frequencies (k,) in rad/s; SceneError for invalid values."""
     try:
-        found = np.array(omega, dtype=np.float64).reshape(-1)
+        frequencies = np.array(omega, dtype=np.float64).reshape(-1)
     except (TypeError, ValueError):
         raise SceneError(f"omega = {omega!r}: expected angular frequencies in rad/s") from None
-    if not found.size:
+    if not frequencies.size:
         raise SceneError("omega is empty: give angular frequencies in rad/s")
-    wrong = found[~((found > 0) & (found < _FASTEST))]
+    wrong = frequencies[~((frequencies > 0) & (frequencies < _FASTEST))]
     if wrong.size:
         raise SceneError(
             f"omega = {wrong[0]:.9g}: expected angular frequencies above 0 and below "
             f"{_FASTEST:g} in rad/s (2 pi times the frequency in Hz)"
         )
-    return found
+    return frequencies
 
 
 def select_inputs(linear: LinearEquations, inputs: Sequence[str] | None) -> Sequence[Channel]:
@@ -322,15 +322,15 @@ class _Sweep:
         moved = x[:, : self.count, self.free]
         if self.modal is not None:
             moved = self.modal.damp(s, moved, x[:, self.count :, self.free])
-        found = np.zeros((len(s), *self.feedthrough.shape), dtype=np.complex128)
-        found += self.feedthrough
+        values = np.zeros((len(s), *self.feedthrough.shape), dtype=np.complex128)
+        values += self.feedthrough
         for order, rows in self.rows.items():
             answers = rows @ moved.swapaxes(1, 2)
-            found += s[:, None, None] ** order * self.loads.sum_by_input(s, answers)
+            values += s[:, None, None] ** order * self.loads.sum_by_input(s, answers)
             for j, (power, column) in self.drive_contributions[order].items():
-                found[:, :, j] += s[:, None] ** (order + power) * column
-        growth[~np.isfinite(found).all(axis=(1, 2))] = np.inf
-        return found, growth, grown, moved
+                values[:, :, j] += s[:, None] ** (order + power) * column
+        growth[~np.isfinite(values).all(axis=(1, 2))] = np.inf
+        return values, growth, grown, moved
 
     def _circle_mean(self, omega: float, straight: Complex, growth: float, body: int) -> Complex:
         """Response where the elimination lost digits: the most accurate of it and circle means.

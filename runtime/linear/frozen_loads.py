@@ -49,8 +49,8 @@ def with_frozen_loads(engine: LoopedEngine, state: State) -> LoopedEngine:
     system = held.packed.system
     values = _values(system, state).tolist()
     loads = tuple(_frozen_load(engine, load, values, state) for load in system.loads)
-    made = replace(system, loads=loads, values=constant_kernel("values", system, values))
-    return LoopedEngine(packed_system(made, engine.packed))
+    frozen_system = replace(system, loads=loads, values=constant_kernel("values", system, values))
+    return LoopedEngine(packed_system(frozen_system, engine.packed))
 
 
 def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
@@ -68,8 +68,8 @@ def with_springs_grounded(engine: LoopedEngine, state: State) -> LoopedEngine:
         still = [(-1, tuple(pose[15:24].tolist()), tuple(pose[0:3].tolist())) for pose in seen]
         first[k] = replace(force, ends=(force.ends[0], still[1]))
         second.append(replace(force, ends=(still[0], force.ends[1])))
-    made = replace(system, forces=(*first, *second))
-    return LoopedEngine(packed_system(made, engine.packed))
+    grounded_system = replace(system, forces=(*first, *second))
+    return LoopedEngine(packed_system(grounded_system, engine.packed))
 
 
 def _values(system: System, state: State) -> Array:
@@ -94,12 +94,14 @@ def _frozen_load(
         return load
     turned = _observed_points(engine, [Probe(load.axes, load.axes_own, (0.0, 0.0, 0.0))], state)
     rotation = turned[0, 15:24].reshape(3, 3)
-    places = []
+    entries_found = []
     for entries in (load.force, load.moment):
-        components = [0.0 if place < 0 else values[place] for place in entries]
-        places.append(tuple(range(len(values), len(values) + 3)))
+        components = [0.0 if index < 0 else values[index] for index in entries]
+        entries_found.append(tuple(range(len(values), len(values) + 3)))
         values += (rotation @ components).tolist()
-    return replace(load, axes=-1, axes_own=INERTIAL, force=places[0], moment=places[1])
+    return replace(
+        load, axes=-1, axes_own=INERTIAL, force=entries_found[0], moment=entries_found[1]
+    )
 
 
 def _frozen_spring(engine: LoopedEngine, spring: ForceNumbers, state: State) -> ForceNumbers:
@@ -125,14 +127,16 @@ def spring_length(engine: LoopedEngine, spring: ForceNumbers, state: State) -> t
 
 def bushing_deflection(engine: LoopedEngine, bushing: ForceNumbers, state: State) -> Array:
     """Deflection (6,) of a bushing at a state, in its own axes."""
-    rest, end = _observed_points(engine, [Probe(*one) for one in bushing.ends], state)
+    rest, end = _observed_points(
+        engine, [Probe(*bushing_end) for bushing_end in bushing.ends], state
+    )
     return deflection_of((rest[None], end[None]))[0]
 
 
 def _observed_points(engine: LoopedEngine, probes: list[Probe], state: State) -> Array:
     """Values (probes, 24) of `Observation.points` at a state."""
-    found = engine.observe(
+    observations = engine.observe(
         np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None], probes,
         parts=("points",),
     )  # fmt: skip
-    return found.points[0]
+    return observations.points[0]

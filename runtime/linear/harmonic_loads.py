@@ -41,12 +41,12 @@ class HarmonicLoads:
     ) -> HarmonicLoads:
         """Columns from efforts (p, nu) of the inputs; for drives, of their accelerations."""
         columns, owners = list(efforts), list(range(len(pushes)))
-        powers = [2 - one.drive if one.drive >= 0 else 0 for one in pushes]
-        for j, one in enumerate(pushes):
-            if one.drive >= 0:
-                moved = linear.drive_columns(one.drive_factors)
+        powers = [2 - channel.drive if channel.drive >= 0 else 0 for channel in pushes]
+        for j, channel in enumerate(pushes):
+            if channel.drive >= 0:
+                moved = linear.drive_columns(channel.drive_factors)
                 columns += [-_expand(linear, x) for x in (moved.stiffness, moved.damping)]
-                powers += [-one.drive, 1 - one.drive]
+                powers += [-channel.drive, 1 - channel.drive]
                 owners += [j, j]
         parts = np.eye(len(pushes))[owners]
         wide = np.reshape(columns, (len(columns), linear.model.nu))
@@ -63,16 +63,16 @@ class HarmonicLoads:
 
         Maps the index of an input to a power of s and a column (outputs,).
         """
-        found = {}
-        for j, one in enumerate(self.inputs):
-            if one.drive_factors:
-                speeds, factors = zip(*one.drive_factors, strict=True)
-                found[j] = -one.drive, rows[:, speeds] @ np.array(factors)
-        return found
+        contributions = {}
+        for j, channel in enumerate(self.inputs):
+            if channel.drive_factors:
+                speeds, factors = zip(*channel.drive_factors, strict=True)
+                contributions[j] = -channel.drive, rows[:, speeds] @ np.array(factors)
+        return contributions
 
 
 def _expand(linear: LinearEquations, x: Array) -> Array:
     """Vector (nu,) with the entries of x (n,) at the indices of its speeds."""
-    found = np.zeros(linear.model.nu)
-    found[list(linear.free_speed_indices)] = x
-    return found
+    expanded = np.zeros(linear.model.nu)
+    expanded[list(linear.free_speed_indices)] = x
+    return expanded

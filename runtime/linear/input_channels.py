@@ -92,23 +92,27 @@ def input_channels(model: CompiledScene, what: str, names: Sequence[str]) -> tup
 
     Raises SceneError for other motions of drives.
     """
-    found = tuple(channel(model, name) for name in require_names(what, names))
-    for one in found:
-        if 0 <= one.drive < 2:
-            instead = ", ".join(f'"{x}"' for x in accelerations(model, one.drive_factors))
+    channels = tuple(channel(model, name) for name in require_names(what, names))
+    for given in channels:
+        if 0 <= given.drive < 2:
+            instead = ", ".join(f'"{x}"' for x in accelerations(model, given.drive_factors))
             raise SceneError(
-                f'"{one.name}": in matrices the input of a drive is its acceleration, '
+                f'"{given.name}": in matrices the input of a drive is its acceleration, '
                 f"{instead}; use that, or frequency_response, which accepts this name too"
             )
-    return found
+    return channels
 
 
 def inputs_of(model: CompiledScene) -> list[str]:
     """Inputs of the scene except those of drives, which are motions and not loads."""
     if not model.scene.input:
         return []
-    driving = {name for one in active_expressions(model.scene) if one.drive for name in one.inputs}
-    return [one.name for one in model.scene.input if one.name not in driving]
+    driving = {
+        name for active in active_expressions(model.scene) if active.drive for name in active.inputs
+    }
+    return [
+        scene_input.name for scene_input in model.scene.input if scene_input.name not in driving
+    ]
 
 
 def channel(model: CompiledScene, name: str) -> Channel:
@@ -122,9 +126,13 @@ def channel(model: CompiledScene, name: str) -> Channel:
     follow but other expressions also read.
     """
     owner, _, last = name.rpartition(".")
-    given = next((one for one in model.scene.input if one.name == name), None)
+    given = next(
+        (scene_input for scene_input in model.scene.input if scene_input.name == name), None
+    )
     if given is not None:
-        if any(one.drive and name in one.inputs for one in active_expressions(model.scene)):
+        if any(
+            active.drive and name in active.inputs for active in active_expressions(model.scene)
+        ):
             return _drive_channel(model, given)
         return Channel(name, given.unit, input=model.coordinate_layout.inputs[name])
     if name in GROUND:
@@ -136,7 +144,7 @@ def channel(model: CompiledScene, name: str) -> Channel:
     ends = BodyReferences(model.scene.skeleton)
     if last.startswith("effort") and owner in model.coordinate_layout.hinges:
         return _effort(model, name, owner, last)
-    springs = [one.name for one in model.scene.spring]
+    springs = [spring.name for spring in model.scene.spring]
     if last == "effort" and owner in springs:
         return Channel(name, "N", spring=springs.index(owner))
     for letter, (kind, unit) in _KINDS.items():
@@ -146,7 +154,7 @@ def channel(model: CompiledScene, name: str) -> Channel:
             if (long or last == letter + component) and end in ends:
                 own = ends.canonical(end) or end
                 return Channel(f"{end}.{kind}.{component}", unit, end=own, kind=kind, axis=axis)
-    given_names = [one.name for one in model.scene.input]
+    given_names = [scene_input.name for scene_input in model.scene.input]
     known = [
         *given_names,
         *driven,
@@ -214,33 +222,33 @@ def columns(
         )
         return np.asarray(loaded - bare)
 
-    found = []
-    for one in channels:
-        if one.input >= 0:
-            found.append(
-                _rate(engine, state, one.input, 0.0) - _rate(engine, state, one.input, 1.0)
+    column_list = []
+    for given in channels:
+        if given.input >= 0:
+            column_list.append(
+                _rate(engine, state, given.input, 0.0) - _rate(engine, state, given.input, 1.0)
             )
-        elif one.drive >= 0:
-            found.append(-drive_columns(engine, state, one.drive_factors).inertia)
-        elif one.speed >= 0:
-            found.append(np.eye(engine.nu)[one.speed])
-        elif one.spring >= 0:
-            found.append(-excess_efforts(_with_unit_spring_effort(engine, one.spring)))
-        elif one.end:
-            found.append(-excess_efforts(_with_unit_load(engine, one)))
+        elif given.drive >= 0:
+            column_list.append(-drive_columns(engine, state, given.drive_factors).inertia)
+        elif given.speed >= 0:
+            column_list.append(np.eye(engine.nu)[given.speed])
+        elif given.spring >= 0:
+            column_list.append(-excess_efforts(_with_unit_spring_effort(engine, given.spring)))
+        elif given.end:
+            column_list.append(-excess_efforts(_with_unit_load(engine, given)))
         else:
-            found.append(excess_efforts(engine.unit_gravity[one.axis]))
-    return np.array(found).T[free]
+            column_list.append(excess_efforts(engine.unit_gravity[given.axis]))
+    return np.array(column_list).T[free]
 
 
-def _rate(engine: LoopedEngine, state: State, place: int, rate: float) -> Array:
+def _rate(engine: LoopedEngine, state: State, index: int, rate: float) -> Array:
     """Time derivative (nu,) of the residual with constant inputs except one of the given rate."""
     system = engine.packed.system
     inputs = [
         PiecewisePolynomial(
-            (), ((state.t, one.value(state.t), rate if k == place else 0.0, 0.0, 0.0),)
+            (), ((state.t, channel_input.value(state.t), rate if k == index else 0.0, 0.0, 0.0),)
         )
-        for k, one in enumerate(system.inputs)
+        for k, channel_input in enumerate(system.inputs)
     ]
     still = replace(system.held_inputs, memory_indices=(-1,) * len(inputs))
     going = replace(system, inputs=tuple(inputs), held_inputs=still)

@@ -53,9 +53,9 @@ class ConvergedPairs:
 
 
 def slowest(
-    pencil: Pencil, wanted: int, sigma: float, edge: float, trial: int, known: ConvergedPairs
+    pencil: Pencil, count: int, sigma: float, edge: float, trial: int, known: ConvergedPairs
 ) -> ConvergedPairs:
-    """Known modes and `wanted` further modes with omega^2 nearest to sigma.
+    """Known modes and `count` further modes with omega^2 nearest to sigma.
 
     There are fewer if one of them already has omega^2 above `edge`.
 
@@ -63,18 +63,18 @@ def slowest(
     """
     pencil.factor(-sigma)
     start = pencil.solve(np.random.default_rng(trial).standard_normal(len(pencil)))
-    found, more = known, 0
+    pairs, more = known, 0
     for _ in range(_MAX_RUNS):
-        run = _Run(pencil, found, start)
-        run.iterate(wanted - more, 1 / (edge - sigma))
+        run = _Run(pencil, pairs, start)
+        run.iterate(count - more, 1 / (edge - sigma))
         squares = sigma + 1 / run.values
-        found = found.merge(squares, run.shapes, run.mass_shapes)
+        pairs = pairs.merge(squares, run.shapes, run.mass_shapes)
         more += len(squares)
-        if more >= wanted or run.is_exhausted or (squares > edge).any():
-            return found
+        if more >= count or run.is_exhausted or (squares > edge).any():
+            return pairs
         start = run.next_start
     raise NumericalFailure(
-        f"modes: not converged: {more} of {wanted} modes found within the iteration limit; request "
+        f"modes: not converged: {more} of {count} modes found within the iteration limit; request "
         "fewer"
     )
 
@@ -98,22 +98,22 @@ class _Run:
         self.values, self.shapes, self.mass_shapes = np.zeros(0), np.zeros((n, 0)), np.zeros((0, n))
         self.is_exhausted = False
 
-    def iterate(self, wanted: int, least: float) -> None:
-        """Iterate until `wanted` modes are found in order.
+    def iterate(self, count: int, least: float) -> None:
+        """Iterate until `count` modes are found in order.
 
         Stop early at a mode with 1/(omega^2 - sigma) below `least`, or without space for further
         vectors.
         """
         n = len(self.pencil)
-        room = min(n - len(self.known_pairs.squares), _VECTORS_PER_MODE * wanted + _EXTRA_VECTORS)
+        room = min(n - len(self.known_pairs.squares), _VECTORS_PER_MODE * count + _EXTRA_VECTORS)
         self.q, self.p = np.empty((room, n)), np.empty((room, n))
         self._append_vector(self.next_start, float(np.linalg.norm(self.next_start)))
         while not self.is_exhausted:
             self._step()
             steps = len(self.alpha)
-            due = steps % _CHECK_INTERVAL == 0 and (steps > wanted or least > 0)
+            due = steps % _CHECK_INTERVAL == 0 and (steps > count or least > 0)
             if (due or self.is_exhausted or steps == room) and self._check_convergence(
-                wanted, least
+                count, least
             ):
                 return
 
@@ -147,18 +147,18 @@ class _Run:
             self.q[j], self.p[j] = w / left, pushed / left
         return left
 
-    def _check_convergence(self, wanted: int, least: float) -> bool:
+    def _check_convergence(self, count: int, least: float) -> bool:
         """Check convergence; at the end of the run store the modes found and return True."""
         steps = len(self.alpha)
         values, weights = eigh_tridiagonal(self.alpha, self.beta[:-1])
         order = np.argsort(-np.abs(values), kind="stable")
         values, weights = values[order], weights[:, order]
         close = np.abs(self.beta[-1] * weights[-1]) <= _CLOSE * np.abs(values)
-        kept = min(int(np.argmin(np.append(close, False))), wanted)
-        enough = kept == wanted or (np.abs(values[:kept]) < least).any()
+        kept = min(int(np.argmin(np.append(close, False))), count)
+        enough = kept == count or (np.abs(values[:kept]) < least).any()
         if not enough and not self.is_exhausted and steps < len(self.q):
             return False
-        self.values, found = values[:kept], weights[:, :kept]
-        self.shapes, self.mass_shapes = self.q[:steps].T @ found, found.T @ self.p[:steps]
-        self.next_start = self.q[:steps].T @ weights[:, kept:wanted].sum(axis=1)
+        self.values, vectors = values[:kept], weights[:, :kept]
+        self.shapes, self.mass_shapes = self.q[:steps].T @ vectors, vectors.T @ self.p[:steps]
+        self.next_start = self.q[:steps].T @ weights[:, kept:count].sum(axis=1)
         return True

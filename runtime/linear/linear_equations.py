@@ -106,7 +106,7 @@ class LinearEquations(AssessedResult):
     def _names_and_units(self) -> list[tuple[str, str]]:
         """Names and units of x."""
         known = dict(zip(self.model.free_speed_indices, self.model.tangent_increments, strict=True))
-        return [known[place] for place in self.free_speed_indices]
+        return [known[index] for index in self.free_speed_indices]
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
@@ -144,15 +144,15 @@ class LinearEquations(AssessedResult):
             return self.constrained_motion.matrices(engine, self.state)
         return matrices(engine, self.state, list(self.free_speed_indices))
 
-    def _second_order(self, found: Matrices) -> Matrices:
+    def _second_order(self, given: Matrices) -> Matrices:
         """Transform from speeds to x' and to the fixed frame.
 
         From x' = G x + du: C du = C x' - C G x and M da = M x'' - M G x'.
         """
         g = self.rate_matrix
         if g is not None:
-            found = Matrices(found.M, found.C - found.M @ g, found.K - found.C @ g)
-        return found if self.frame_transform is None else self.frame_transform.matrices(found)
+            given = Matrices(given.M, given.C - given.M @ g, given.K - given.C @ g)
+        return given if self.frame_transform is None else self.frame_transform.matrices(given)
 
     @property
     def has_stiffness(self) -> bool:
@@ -212,22 +212,26 @@ class LinearEquations(AssessedResult):
     @property
     def input_names(self) -> tuple[str, ...]:
         """Names of v."""
-        return tuple(one.name for one in self.input_channels)
+        return tuple(given.name for given in self.input_channels)
 
     @property
     def disturbance_names(self) -> tuple[str, ...]:
         """Names of w."""
-        return tuple(one.name for one in self.disturbance_channels)
+        return tuple(given.name for given in self.disturbance_channels)
 
     @property
     def drive_indices(self) -> tuple[int, ...]:
         """Speed indices of the drives whose motions are inputs or disturbances."""
         moved = [
-            one.drive_factors
-            for one in (*self.input_channels, *self.disturbance_channels)
-            if one.drive_factors
+            entry.drive_factors
+            for entry in (*self.input_channels, *self.disturbance_channels)
+            if entry.drive_factors
         ]
-        return tuple(dict.fromkeys(speed for one in moved for speed, _ in one)) if moved else ()
+        return (
+            tuple(dict.fromkeys(speed for factors in moved for speed, _ in factors))
+            if moved
+            else ()
+        )
 
     @property
     def prescribed_coordinates(self) -> tuple[str, ...]:
@@ -242,9 +246,9 @@ class LinearEquations(AssessedResult):
                 "fixed frame: motions of drives cannot be inputs; leave them out, or use efforts "
                 "and forces"
             )
-        found = [self.drive_columns(((speed, 1.0),)) for speed in self.drive_indices]
-        both = [(one.stiffness, one.damping) for one in found]
-        wide = np.reshape(both, (len(found), 2, len(self)))
+        drive_columns = [self.drive_columns(((speed, 1.0),)) for speed in self.drive_indices]
+        both = [(drive_column.stiffness, drive_column.damping) for drive_column in drive_columns]
+        wide = np.reshape(both, (len(drive_columns), 2, len(self)))
         return wide[:, 0].T, wide[:, 1].T
 
     def drive_columns(self, moves: DriveFactors) -> Columns:
@@ -252,7 +256,7 @@ class LinearEquations(AssessedResult):
         if self.constrained_motion is not None:
             return self.constrained_motion.drive_columns(self.state, moves)
         wide = drive_columns(self.model.looped, self.state, moves)
-        return Columns(*(one[list(self.free_speed_indices)] for one in wide))
+        return Columns(*(column[list(self.free_speed_indices)] for column in wide))
 
     @property
     def C_prescribed(self) -> Array:
@@ -277,23 +281,29 @@ class LinearEquations(AssessedResult):
     def input_matrix(self, channels: Sequence[Channel]) -> Array:
         """Efforts (n, channels) per unit of each channel."""
         if self.constrained_motion is None:
-            found = columns(self.open_tree, self.state, channels, list(self.free_speed_indices))
+            input_columns = columns(
+                self.open_tree, self.state, channels, list(self.free_speed_indices)
+            )
         else:
-            found = self.constrained_motion.input_matrix(self.state, channels)
-        return found if self.frame_transform is None else self.frame_transform.input_matrix(found)
+            input_columns = self.constrained_motion.input_matrix(self.state, channels)
+        return (
+            input_columns
+            if self.frame_transform is None
+            else self.frame_transform.input_matrix(input_columns)
+        )
 
     def _modal_matrix(self, matrix: Callable[..., Array]) -> Array:
         """Matrix (n, n) assembled from a matrix of each flexible body."""
-        found = np.zeros((self.model.nu, self.model.nu))
+        modal_matrix = np.zeros((self.model.nu, self.model.nu))
         for name, slots in self.model.coordinate_layout.modal.items():
-            found[slots.u_slice, slots.u_slice] = matrix(self.model.flexible_bodies[name])
+            modal_matrix[slots.u_slice, slots.u_slice] = matrix(self.model.flexible_bodies[name])
         if self.constrained_motion is not None:
             return (
                 self.constrained_motion.motion_basis.T
-                @ found
+                @ modal_matrix
                 @ self.constrained_motion.motion_basis
             )
-        return found[np.ix_(self.free_speed_indices, self.free_speed_indices)]
+        return modal_matrix[np.ix_(self.free_speed_indices, self.free_speed_indices)]
 
     def symbolic(self, keep: Sequence[str]) -> SymbolicLinearModel:
         """M, C, K, V and W as SymPy expressions in the names `keep`.
@@ -318,8 +328,8 @@ class LinearEquations(AssessedResult):
                 "C and K"
             )
         names = keep if isinstance(keep, str) else require_texts("keep", keep, "rod1.mass")
-        found: SymbolicLinearModel = self.model.fusion.symbolic(self, names)
-        return found
+        symbolic_model: SymbolicLinearModel = self.model.fusion.symbolic(self, names)
+        return symbolic_model
 
     @cached_property
     def operators(self) -> Pencil:
@@ -332,9 +342,9 @@ class LinearEquations(AssessedResult):
             x = np.linalg.solve(self.frame_transform.rotation, x)
         if self.constrained_motion is not None:
             return np.asarray(self.constrained_motion.motion_basis @ x)
-        found = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)
-        found[list(self.free_speed_indices)] = x
-        return found
+        expanded = np.zeros((self.model.nu, *x.shape[1:]), dtype=x.dtype)
+        expanded[list(self.free_speed_indices)] = x
+        return expanded
 
     def displaced_state(self, x: Array) -> Array:
         """Coordinates q (nq,) of the state displaced by increments x (n,)."""

@@ -45,10 +45,10 @@ class Matrices:
 
 def matrices(engine: LoopedEngine, state: State, free: Sequence[int]) -> Matrices:
     """Matrices of a packed scene; NumericalFailure if the state cannot be evaluated."""
-    found = thread_tangent(engine).matrices(state.t, state.q, state.u, state.udot, free)
-    if not np.isfinite(found).all():
+    values = thread_tangent(engine).matrices(state.t, state.q, state.u, state.udot, free)
+    if not np.isfinite(values).all():
         raise _no_slope(engine, state)
-    return Matrices(*found)
+    return Matrices(*values)
 
 
 def _no_slope(engine: LoopedEngine, state: State) -> NumericalFailure:

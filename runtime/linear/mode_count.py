@@ -47,13 +47,13 @@ class ModeCounter:
         """
         efforts = self._efforts
         self.tree.factor(-square)
-        found = self.tree.tangent.count_negative()
-        if found is None or not efforts.size:
-            return found
+        count = self.tree.tangent.count_negative()
+        if count is None or not efforts.size:
+            return count
         more = self._count_difference(
             square, _basis([self.tree.solve(column) for column in efforts.T])
         )
-        return None if more is None else found + more
+        return None if more is None else count + more
 
     @cached_property
     def _efforts(self) -> Array:
@@ -70,14 +70,14 @@ class ModeCounter:
 
     def _count_difference(self, square: float, w: Array) -> int | None:
         """Number of negative eigenvalues of A less that of T; None if either is not symmetric."""
-        found = []
+        counts = []
         for pencil in (self.full_pencil, self.tree):
             pressed = [pencil.stiffness(x) - square * pencil.mass(x) for x in w.T]
             matrix = w.T @ np.array(pressed).T
             if np.abs(matrix - matrix.T).max() > _SYMMETRIC * np.abs(matrix).max():
                 return None
-            found.append(int((np.linalg.eigvalsh((matrix + matrix.T) / 2) < 0).sum()))
-        return found[0] - found[1]
+            counts.append(int((np.linalg.eigvalsh((matrix + matrix.T) / 2) < 0).sum()))
+        return counts[0] - counts[1]
 
 
 def _basis(columns: list[Array]) -> Array:

@@ -29,8 +29,8 @@ def modes(linear: LinearEquations, count: int | None, damped: bool | None) -> Mo
     few = count is not None and len(linear) > _DENSE and 4 * count <= len(linear)
     few = few and linear.constrained_motion is None and linear.frame_transform is None
     if count is None or not few or linear.rate_matrix is not None:
-        found = _dense(linear, damped)
-        return found if count is None else replace(found.lowest(count), count=count)
+        dense_modes = _dense(linear, damped)
+        return dense_modes if count is None else replace(dense_modes.lowest(count), count=count)
     return replace(_lowest_modes(linear, count, damped), count=count)
 
 
@@ -83,9 +83,9 @@ def _symmetric(linear: LinearEquations) -> tuple[Array, Array]:
 def _general(linear: LinearEquations, c: Array) -> Modes:
     """Modes of the quadratic eigenvalue problem, reduced to first order."""
     n = len(linear)
-    zero, one = np.zeros((n, n)), np.eye(n)
-    a = np.block([[zero, one], [-linear.K, -c]])
-    b = np.block([[one, zero], [zero, linear.M]])
+    zero, identity = np.zeros((n, n)), np.eye(n)
+    a = np.block([[zero, identity], [-linear.K, -c]])
+    b = np.block([[identity, zero], [zero, linear.M]])
     pairs: Any = eig(a, b)
     values, vectors = pairs
     if not np.isfinite(values).all():
@@ -96,8 +96,8 @@ def _general(linear: LinearEquations, c: Array) -> Modes:
     kept = np.flatnonzero(np.imag(values) >= 0)
     kept = kept[np.argsort(np.abs(values[kept]), kind="stable")]
     shapes = vectors[:n, kept]
-    places = np.abs(shapes).argmax(axis=0)
-    shapes = shapes / shapes[places, np.arange(len(kept))]
+    largest_rows = np.abs(shapes).argmax(axis=0)
+    shapes = shapes / shapes[largest_rows, np.arange(len(kept))]
     return Modes(linear, values[kept].astype(np.complex128), shapes, True)
 
 

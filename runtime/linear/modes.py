@@ -98,8 +98,10 @@ class Modes(PublicMembers, AssessedResult):
             for risk in self._range_risks_of(fast):
                 yield replace(risk, invalidates=is_objection)
 
-    def _range_risks_of(self, places: NDArray[np.intp]) -> Iterator[Risk]:
-        some = replace(self, eigenvalues=self.eigenvalues[places], shapes=self.shapes[:, places])
+    def _range_risks_of(self, mode_indices: NDArray[np.intp]) -> Iterator[Risk]:
+        some = replace(
+            self, eigenvalues=self.eigenvalues[mode_indices], shapes=self.shapes[:, mode_indices]
+        )
         return motion_range_risks(self.linear.model, some.omega, some.strain_energy_shares())
 
     def motion_risks(self) -> Iterator[Risk]:
@@ -222,8 +224,8 @@ class Modes(PublicMembers, AssessedResult):
         A radian counts as one length of the scene.
         """
         size = np.abs(self._shape(k)) * self._lengths
-        places = np.flatnonzero(size > 0.1 * size.max(initial=0))
-        order = places[np.argsort(-size[places], kind="stable")]
+        large_entries = np.flatnonzero(size > 0.1 * size.max(initial=0))
+        order = large_entries[np.argsort(-size[large_entries], kind="stable")]
         return [self.linear.coordinate_names[j] for j in order]
 
     def to_dict(self) -> dict[str, Any]:
@@ -343,10 +345,10 @@ class Modes(PublicMembers, AssessedResult):
         if which is None:
             which = np.flatnonzero(self.omega > 0)[:_PANELS].tolist() or None
         which = self._shape_indices(which)
-        made = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
+        animation = view(self.linear, self.eigenvalues, self.shapes, which, amplitude, title)
         if path is not None:
-            made.save(path)
-        return made
+            animation.save(path)
+        return animation
 
     def plot_eigenvalues(self, path: str | Path | None = None) -> Any:
         """Eigenvalue plot as a `matplotlib.figure.Figure`, written to `path` if given.

@@ -28,7 +28,7 @@ def output_matrices(
     shown = outputs_of(linear, named)
     check_steady_outputs(linear, shown)
     c, d = linear.state_output_matrices(rows_of(linear, shown, pushes), b)
-    return tuple(one.name for one in shown), c, d
+    return tuple(quantity.name for quantity in shown), c, d
 
 
 def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: bool) -> Any:
@@ -47,7 +47,7 @@ def to_control(linear: StateSpace, outputs: Sequence[str] | None, disturbances: 
     names, c, d = output_matrices(linear, outputs, pushes, b)
     return control.ss(
         linear.A, b, c, d, states=list(map(_signal, linear.state_names)),
-        inputs=[_signal(one.name) for one in pushes], outputs=list(map(_signal, names)),
+        inputs=[_signal(entry.name) for entry in pushes], outputs=list(map(_signal, names)),
     )  # fmt: skip
 
 

@@ -140,22 +140,22 @@ def trace_modes(
 ) -> RootLocus:
     """Modes at each parameter value, paired in columns; `frame` as in `Model.locus`."""
     models, risks = _in_frame([at(value) for value in values.tolist()], parameter, frame)
-    found = [linear.modes(count, damped) for linear in models]
-    width = max(len(one) for one in found)
+    modes_by_value = [linear.modes(count, damped) for linear in models]
+    width = max(len(modes) for modes in modes_by_value)
     if not width:
         raise SceneError("the scene has no degrees of freedom, so that it has no modes")
-    rows = np.full((len(found), width), np.nan + 0j)
+    rows = np.full((len(modes_by_value), width), np.nan + 0j)
     turns = np.full(rows.shape, np.nan)
-    order: Integers = np.arange(len(found[0]))
-    rows[0, order], turns[0, order] = found[0].eigenvalues, found[0].whirl
-    for row, (before, now) in enumerate(pairwise(found), start=1):
+    order: Integers = np.arange(len(modes_by_value[0]))
+    rows[0, order], turns[0, order] = modes_by_value[0].eigenvalues, modes_by_value[0].whirl
+    for row, (before, now) in enumerate(pairwise(modes_by_value), start=1):
         order = _pair_modes(before, now, order, width)
         rows[row, order], turns[row, order] = now.eigenvalues, now.whirl
-    rotating = any(one.frame == "rotating" for one in found)
+    rotating = any(modes.frame == "rotating" for modes in modes_by_value)
     frame = "rotating" if rotating else "fixed"
-    each = list(zip(values.tolist(), found, strict=True))
+    each = list(zip(values.tolist(), modes_by_value, strict=True))
     findings = DeferredRisks(
-        lambda: (*risks, *merge_over_values(parameter, [(x, one.risks) for x, one in each]))
+        lambda: (*risks, *merge_over_values(parameter, [(x, modes.risks) for x, modes in each]))
     )
     return RootLocus(parameter, values, rows, frame, turns, findings)
 
@@ -192,10 +192,10 @@ def _pair_modes(before: Modes, now: Modes, order: Integers, width: int) -> Integ
     unit = [x / np.linalg.norm(x, axis=0) for x in (before.shapes, now.shapes)]
     unlike = 1 - np.abs(np.conj(unit[0]).T @ unit[1])
     rows, columns = linear_sum_assignment(apart + unlike)
-    places = np.full(len(now), -1)
-    places[columns] = order[rows]
-    spare = iter(sorted(set(range(width)) - set(places.tolist())))
-    return np.array([next(spare) if place < 0 else place for place in places])
+    columns_of_modes = np.full(len(now), -1)
+    columns_of_modes[columns] = order[rows]
+    spare = iter(sorted(set(range(width)) - set(columns_of_modes.tolist())))
+    return np.array([next(spare) if column < 0 else column for column in columns_of_modes])
 
 
 @dataclass(frozen=True)
@@ -242,11 +242,11 @@ def critical(at: ModelAtValue, parameter: str, low: float, high: float) -> Stabi
         middle = (low + high) / 2
         if middle in (low, high):
             break
-        found = _modes_at(at, middle)
-        if found is not None and _most_unstable_mode(found) is None:
-            low, below = middle, found
+        middle_modes = _modes_at(at, middle)
+        if middle_modes is not None and _most_unstable_mode(middle_modes) is None:
+            low, below = middle, middle_modes
         else:
-            high, last = middle, found
+            high, last = middle, middle_modes
     growing = None if last is None else _most_unstable_mode(last)
     value, names = (0j, ()) if last is None or growing is None else (
         complex(last.eigenvalues[growing]), tuple(last.dominant_coordinates(growing))

@@ -55,21 +55,21 @@ class LowestModes:
 def undamped_modes(pencil: Pencil, count: int) -> LowestModes:
     """The `count` modes of smallest omega^2 of M and a symmetric K; says if one is missing."""
     n, counting = len(pencil), ModeCounter(pencil)
-    wanted, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
-    found, edge, values = ConvergedPairs.empty(n), np.inf, np.zeros(0)
+    mode_count, sigma = min(count + _BEYOND, n - 1), _shift(pencil, counting)
+    pairs, edge, values = ConvergedPairs.empty(n), np.inf, np.zeros(0)
     for trial in range(_TRIALS):
-        found = slowest(pencil, wanted, sigma, edge, trial, found)
-        values = np.where(np.abs(found.squares) <= _ROUNDING * abs(sigma), 0.0, found.squares)
+        pairs = slowest(pencil, mode_count, sigma, edge, trial, pairs)
+        values = np.where(np.abs(pairs.squares) <= _ROUNDING * abs(sigma), 0.0, pairs.squares)
         kept, edge = _spectral_gap(values, count)
         counted = counting.count_below(edge)
         if counted is None or counted == kept:
             complete = None if counted is None else True
-            return LowestModes(values[:count], found.shapes[:, :count], complete)
-        wanted = counted - kept
+            return LowestModes(values[:count], pairs.shapes[:, :count], complete)
+        mode_count = counted - kept
         if counted < kept:  # spurious modes were found: repeat with a shift that separates them
-            found, sigma = ConvergedPairs.empty(n), min(sigma, edge - abs(edge))
-            wanted, edge = min(count + _BEYOND, n - 1), np.inf
-    return LowestModes(values[:count], found.shapes[:, :count], False)
+            pairs, sigma = ConvergedPairs.empty(n), min(sigma, edge - abs(edge))
+            mode_count, edge = min(count + _BEYOND, n - 1), np.inf
+    return LowestModes(values[:count], pairs.shapes[:, :count], False)
 
 
 def _spectral_gap(values: Array, count: int) -> tuple[int, float]:
@@ -142,13 +142,13 @@ def damped_modes(pencil: Pencil, count: int, with_c: bool) -> LowestModes:
     k = min(2 * count + 4 * _BEYOND, 2 * n - 2)
     start = np.random.default_rng(0).standard_normal(2 * n)
     try:
-        found: Any = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
+        eigenpairs: Any = eigs(operator, k=k, v0=start, ncv=min(2 * n, 2 * k + 20))
     except ArpackError as error:
         raise NumericalFailure(f"modes: the iteration broke down ({error})") from None
-    inverses, vectors = found
+    inverses, vectors = eigenpairs
     values = sigma + 1 / inverses
     kept = np.flatnonzero(values.imag >= -1e-9 * np.abs(values))
     kept = kept[np.argsort(np.abs(values[kept]), kind="stable")][:count]
     shapes = vectors[:n, kept]
-    places = np.abs(shapes).argmax(axis=0)
-    return LowestModes(values[kept], shapes / shapes[places, np.arange(len(kept))], None)
+    largest_rows = np.abs(shapes).argmax(axis=0)
+    return LowestModes(values[kept], shapes / shapes[largest_rows, np.arange(len(kept))], None)

@@ -43,23 +43,23 @@ class StateSpace(LinearEquations):
         """System matrix (2 n + 2 k, 2 n + 2 k) with k drives."""
         if not self.drive_indices:
             return self._undriven
-        found = np.zeros((len(self.state_names), len(self.state_names)))
-        found[self.position_states, self.velocity_states] = 1.0
+        matrix = np.zeros((len(self.state_names), len(self.state_names)))
+        matrix[self.position_states, self.velocity_states] = 1.0
         n = len(self)
-        found[: 2 * n, : 2 * n] = self._undriven
+        matrix[: 2 * n, : 2 * n] = self._undriven
         both = np.hstack([self.K_prescribed, self.C_prescribed])
-        found[n : 2 * n, 2 * n :] = -np.linalg.solve(self.M, both)
-        return found
+        matrix[n : 2 * n, 2 * n :] = -np.linalg.solve(self.M, both)
+        return matrix
 
     @property
     def _undriven(self) -> Array:
         """System matrix (2 n, 2 n) of (x, x') without motion of drives."""
         if self.compiled_state is not None and self.frame_transform is None:
-            found = self.model.compiled_linearisation.state_matrix(
+            matrix = self.model.compiled_linearisation.state_matrix(
                 self.compiled_state, self.rate_matrix is not None
             )
-            if found is not None:
-                return found
+            if matrix is not None:
+                return matrix
         n = len(self)
         below = -np.linalg.solve(self.M, np.hstack([self.K, self.C]))
         return np.vstack([np.hstack([np.zeros((n, n)), np.eye(n)]), below])
@@ -90,10 +90,10 @@ class StateSpace(LinearEquations):
         return c, d
 
     def _input_columns(self, pushes: Sequence[Channel], efforts: Array) -> Array:
-        found = np.zeros((len(self.state_names), len(pushes)))
+        input_matrix = np.zeros((len(self.state_names), len(pushes)))
         n, k = len(self), len(self.drive_indices)
-        found[n : 2 * n] = np.linalg.solve(self.M, efforts)
-        for j, one in enumerate(pushes):
-            for speed, factor in one.drive_factors:
-                found[2 * n + k + self.drive_indices.index(speed), j] = factor
-        return found
+        input_matrix[n : 2 * n] = np.linalg.solve(self.M, efforts)
+        for j, channel in enumerate(pushes):
+            for speed, factor in channel.drive_factors:
+                input_matrix[2 * n + k + self.drive_indices.index(speed), j] = factor
+        return input_matrix

@@ -45,7 +45,7 @@ def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
     yield from find_start_risks(linear, _ALL_MOTIONS)
     changing = {risk.element for risk in unsteady}
     yield from (
-        one for one in ineffective_input_risks(linear, linear.V) if one.element not in changing
+        risk for risk in ineffective_input_risks(linear, linear.V) if risk.element not in changing
     )
     yield from find_omissions(linear)
     if len(linear) <= _ALL_MOTIONS:
@@ -53,19 +53,19 @@ def find_linear_risks(linear: LinearEquations) -> Iterator[Risk]:
     else:
         yield information(
             "stability-unknown", RUN,
-            f"more than {_ALL_MOTIONS} coordinates: not examined for motions that grow or that "
-            "nothing pushes back", "look at the slowest modes, modes(count=...)",
+            f"more than {_ALL_MOTIONS} coordinates: not examined for unstable or unrestrained "
+            "motions", "compute the lowest modes, modes(count=...)",
         )  # fmt: skip
 
 
 def find_omissions(linear: LinearEquations) -> Iterator[Risk]:
     """Risks of omissions of a linear model: controllers, outputs, dependence on time."""
-    for one in linear.model.scene.controller:
+    for controller in linear.model.scene.controller:
         yield information(
             "controller-left-out",
-            f'controller "{one.name}"',
-            f'controller "{one.name}" is left out: its inputs '
-            f"({abbreviate_names(list(one.outputs))}) "
+            f'controller "{controller.name}"',
+            f'controller "{controller.name}" is left out: its inputs '
+            f"({abbreviate_names(list(controller.outputs))}) "
             "are constant, with the values of the scene",
             "close the loop by the inputs of this model",
         )
@@ -89,9 +89,9 @@ def find_response_risks(
     Instability is an objection because it prevents a steady state.  Inputs and outputs that were
     not requested are left out.
     """
-    asked = {f'input "{one.name}"' for one in pushes}
+    input_elements = {f'input "{channel.name}"' for channel in pushes}
     for risk in linear.risks:
-        if risk.name in INPUT_RISKS and risk.element not in asked:
+        if risk.name in INPUT_RISKS and risk.element not in input_elements:
             continue
         if not (are_outputs_chosen and risk.name == OUTPUT_LEFT_OUT):
             yield replace(risk, invalidates=True) if risk.name == "unstable" else risk
@@ -111,11 +111,11 @@ def _unsteady(linear: LinearEquations) -> Iterator[Risk]:
                 "the motion or with time", "analyse a smaller part of the scene",
             )  # fmt: skip
         return
-    asked = (
+    input_channels = (
         *linear.input_channels,
         *(() if linear.disturbance_names == GROUND else linear.disturbance_channels),
     )
-    changing = find_changes(linear, later, asked)
+    changing = find_changes(linear, later, input_channels)
     if MATRICES in changing:
         yield Risk(
             "changing-coefficients", RUN,
@@ -171,7 +171,7 @@ def is_unsteady(linear: LinearEquations) -> bool:
     return not _is_balanced(linear, linear.constrained_motion.motion_basis)
 
 
-def _is_balanced(linear: LinearEquations, ways: Array) -> bool:
+def _is_balanced(linear: LinearEquations, motions: Array) -> bool:
     """Whether efforts along the independent motions of a mechanism are rounding errors.
 
     They are relative to the efforts that cancel.  Rounding may still move weakly constrained
@@ -179,5 +179,5 @@ def _is_balanced(linear: LinearEquations, ways: Array) -> bool:
     """
     state, tree = linear.state, linear.open_tree
     efforts = tree.inverse_dynamics(state.t, state.q, state.u, 0 * state.udot, tree.start_memory())
-    left, whole = np.abs(ways.T @ efforts), np.abs(ways).T @ np.abs(efforts)
+    left, whole = np.abs(motions.T @ efforts), np.abs(motions).T @ np.abs(efforts)
     return bool((left <= _CANCELLED * whole).all())

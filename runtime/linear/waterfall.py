@@ -97,11 +97,11 @@ def waterfall(
     for what, name in (("input", pushed), ("output", shown)):
         if not isinstance(name, str):
             raise SceneError(f"{what} = {name!r}: expected one name, not a list of them")
-    found = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
-    rows = np.array([one.response[:, 0, 0] for one in found])
-    first = found[0]
-    each = list(zip(points.tolist(), found, strict=True))
+    responses = [frequency_response(at(x), omega, [pushed], [shown]) for x in points.tolist()]
+    rows = np.array([response.response[:, 0, 0] for response in responses])
+    first = responses[0]
+    each = list(zip(points.tolist(), responses, strict=True))
     return Waterfall(
         parameter, points, first.omega, first.input_names[0], first.output_names[0], rows,
-        DeferredRisks(lambda: merge_over_values(parameter, [(x, one.risks) for x, one in each])),
+        DeferredRisks(lambda: merge_over_values(parameter, [(x, row.risks) for x, row in each])),
     )  # fmt: skip

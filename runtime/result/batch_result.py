@@ -197,9 +197,9 @@ class BatchResult(AssessedResult, BatchData):
             figure.write(Path(path))
         return figure.figure
 
-    def _bands(self, wanted: PlotSelection, there: Sequence[int]) -> list[Panel]:
+    def _bands(self, selection: PlotSelection, there: Sequence[int]) -> list[Panel]:
         longest = max(there, key=lambda k: self._finite_samples(k).sum())
-        panel_list = build_panels({"run": self.result(longest)}, wanted)
+        panel_list = build_panels({"run": self.result(longest)}, selection)
         quantities = iter(self._quantities([name for panel in panel_list for name in panel.names]))
         band_label = (
             f"median and {_BAND_PERCENTILES[0]:g} to {_BAND_PERCENTILES[1]:g} % of "

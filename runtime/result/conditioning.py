@@ -262,7 +262,7 @@ def singular_distance(model: CompiledScene, run: Trajectory) -> SingularDistance
                 measures = _singularity_measures(model, run, number, kernel)
                 if len(measures):
                     distances.append(_smallest_distance(model, run, number, measures))
-    return min(distances, key=lambda one: one.measure, default=None)
+    return min(distances, key=lambda candidate: candidate.measure, default=None)
 
 
 def _smallest_distance(

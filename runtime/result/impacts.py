@@ -27,16 +27,16 @@ _ZERO_RATIO = 1e-9
 
 
 def momentum_kept_by_impacts(
-    result: Record, roots: Sequence[Hinge], pivot: Array, asked: NDArray[np.bool_]
+    result: Record, roots: Sequence[Hinge], pivot: Array, is_requested: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Mask (6,) of the components in `asked` that the impacts of a run conserve.
+    """Mask (6,) of the components in `is_requested` that the impacts of a run conserve.
 
     Linear momentum along each axis, then angular momentum about `pivot` (3,) in m; `roots` are the
     hinges on the ground.
     """
-    kept, impacts = asked.copy(), _impact_samples(result)
+    kept, impacts = is_requested.copy(), _impact_samples(result)
     if impacts is None:
-        return np.zeros_like(asked)
+        return np.zeros_like(is_requested)
     if impacts and kept.any():
         scene = _RigidScene(result, roots, pivot)
         for row, event in impacts:
@@ -74,14 +74,14 @@ class _RigidScene:
         self._kinematics = Kinematics(result.model.looped, NoFusedCode(), references, lambda: None)
 
     def rigid_motion_axes(
-        self, row: int, event: int, asked: NDArray[np.bool_]
+        self, row: int, event: int, is_requested: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
-        """Mask of the `asked` axes (6,) along and about which the scene can move rigidly.
+        """Mask of the `is_requested` axes (6,) along and about which the scene can move rigidly.
 
         The motion must not change the distance to the object of the event.
         """
         speeds, allowed = self._rigid(row)
-        remaining = asked & allowed
+        remaining = is_requested & allowed
         try:
             remaining[remaining] = self._is_constant(
                 row, event, speeds[remaining], self._sizes(row)[remaining]

@@ -123,7 +123,7 @@ def _rerun_with_all_steps(model: CompiledScene, run: Trajectory) -> Trajectory |
 
 
 def _risk(
-    what: str, name: str, path: _SampledPath, place: float, way: float, longest: float
+    what: str, name: str, path: _SampledPath, position: float, step_distance: float, longest: float
 ) -> Risk:
     remedy = f"use max_step = {longest:.1g} or less"
     if not path.ranges:
@@ -133,8 +133,9 @@ def _risk(
         )
     return Risk(
         "narrow-load", what,
-        f"{what} has a feature near {name} = {place:.6g}, narrower than {longest:.2g}, that was "
-        f"missed by steps of up to {way:.2g} there", remedy, way, longest, path.unit,
+        f"{what} has a feature near {name} = {position:.6g}, narrower than {longest:.2g}, that was "
+        f"missed by steps of up to {step_distance:.2g} there",
+        remedy, step_distance, longest, path.unit,
     )  # fmt: skip
 
 
@@ -409,7 +410,11 @@ def _hidden_height(value: float, ends: Array, both: bool) -> Array:
 
 
 def _narrow_peaks(
-    view: ExpressionFunctions, one: WatchedFunction, known: StepLimits, narrow: Array, high: float
+    view: ExpressionFunctions,
+    watched: WatchedFunction,
+    known: StepLimits,
+    narrow: Array,
+    high: float,
 ) -> tuple[Array, Array, Array]:
     """Peaks of a function in its narrow parts: position, height, and step limit there."""
     ends = np.append(known.starts[1:], high)
@@ -423,7 +428,7 @@ def _narrow_peaks(
         np.concatenate(positions), return_index=True
     )  # shared edges of parts
     limit = np.concatenate(limits)[first_indices]
-    values = view.values(one.term, points)
+    values = view.values(watched.term, points)
     signs = np.sign(np.diff(values))
     moving = np.flatnonzero(np.abs(signs) > 0)  # equal neighbours may be a turning point, too
     peak_indices = moving[1:][np.diff(signs[moving]) != 0][:_MAX_PEAKS]

@@ -131,9 +131,9 @@ class Observations:
             references = list(self.references)
         self._observe_parts(references, parts)
 
-    def _observe_parts(self, wanted: Sequence[str], parts: Sequence[str]) -> None:
+    def _observe_parts(self, names: Sequence[str], parts: Sequence[str]) -> None:
         run = self.run
-        probes = [Probe(*self.engine.packed.end(r)) for r in wanted]
+        probes = [Probe(*self.engine.packed.end(r)) for r in names]
         observation = self.engine.observe(run.t, run.q, run.u, run.memory, probes, parts)
         if "efforts" in parts:
             _clear_modal_efforts(observation.efforts, self.engine.packed.layout)
@@ -143,7 +143,7 @@ class Observations:
         ):
             array.flags.writeable = False
         self.failures = self.failures or observation.failures
-        for i, name in enumerate(wanted):
+        for i, name in enumerate(names):
             self._points[name] = observation.points[:, i]
         self._parts |= {name: getattr(observation, name) for name in parts if name != "points"}
 

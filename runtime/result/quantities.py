@@ -81,7 +81,7 @@ class Quantities:
             )
         for constraint in loop_scene.constraint:
             self._add_deferred(
-                constraint.name, partial(add_constraint, observed=observed, one=constraint)
+                constraint.name, partial(add_constraint, observed=observed, constraint=constraint)
             )
         for coupling in loop_scene.coupling:
             self._add_deferred(
@@ -145,9 +145,9 @@ class Quantities:
             if (entry := self._entry(full_name)) is not None:
                 return entry() if full_name == name else replace(entry(), name=name)
         owners = [
-            one
+            owner
             for full_name in self._external_names.resolve(name)
-            for one in self._owners_in(full_name)
+            for owner in self._owners_in(full_name)
         ]
         known_names = [n for owner in owners for n in self.table_of(owner).entries]
         hint = did_you_mean(name, (*known_names, *self._all_names()))
@@ -318,8 +318,8 @@ class Quantities:
         channel = packed.system.inputs[packed.layout.inputs[name]]
         return lambda: np.array([channel.value(t) for t in self.run.t.tolist()])
 
-    def _memory_getter(self, place: int) -> Values:
-        return lambda: self.run.memory[:, place]
+    def _memory_getter(self, memory_index: int) -> Values:
+        return lambda: self.run.memory[:, memory_index]
 
     @staticmethod
     def _bound(method: Callable[[str, str], Array], name: str, kind: str) -> Values:

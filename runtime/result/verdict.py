@@ -36,8 +36,8 @@ class Verdict:
     def __str__(self) -> str:
         if self.objections:
             other_count = len(self.objections) - 1
-            others = f" (and {other_count} more, see below)" if other_count else ""
-            return f"NOT trusted: {_first_clause(self.objections[0])}{others}"
+            remainder = f" (and {other_count} more, see below)" if other_count else ""
+            return f"NOT trusted: {_first_clause(self.objections[0])}{remainder}"
         if self.unchecked:
             return f"not verified: {'; '.join(self.unchecked)}; no check objects"
         return f"trusted: {self.bounds}, all models within their validity range"

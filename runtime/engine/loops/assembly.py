@@ -228,7 +228,9 @@ class Assembly:
 
     def _free_speeds(self) -> Array:
         engine, packed = self.calls.engine, self.calls.engine.packed
-        driven_speeds = {(engine.hinge_name(place), k) for place, k in packed.system.driven}
+        driven_speeds = {
+            (engine.hinge_name(tree_index), k) for tree_index, k in packed.system.driven
+        }
         is_free_speed = np.ones(engine.nu)
         for hinge in packed.user_scene.hinge:
             slots = packed.layout.hinges[hinge.name]

@@ -177,7 +177,10 @@ class BranchSearch:
         )
         for closed in closed_states:
             nearest_state = self._descend_branch(closed)
-            if all(self._distance(nearest_state, other) > _MAX_BRANCH_DISTANCE for other in states):
+            if all(
+                self._distance(nearest_state, known_state) > _MAX_BRANCH_DISTANCE
+                for known_state in states
+            ):
                 states.append(nearest_state)
         ranked = sorted(states, key=lambda q: round(requested.distance(q) / _MIN_IMPROVEMENT))
         return tuple(
@@ -235,8 +238,8 @@ class BranchSearch:
             q, distance = closed_q, self._requested.distance(closed_q)
         return q
 
-    def _distance(self, one: Array, other: Array) -> float:
-        difference = one - other
+    def _distance(self, first_q: Array, second_q: Array) -> float:
+        difference = first_q - second_q
         difference[self._requested.angle_indices] = _wrap_angles(
             difference[self._requested.angle_indices]
         )
@@ -319,11 +322,11 @@ def _start_from_placed_bodies(
     return None if closed_q is None else _convert_q(closed_q, repacked, packed)
 
 
-def _convert_q(q: Array, packed: PackedScene, other: PackedScene) -> Array:
+def _convert_q(q: Array, packed: PackedScene, target: PackedScene) -> Array:
     """Convert q (nq,) of a scene to that of the same scene with other cut hinges."""
-    converted = np.zeros(other.layout.nq)
+    converted = np.zeros(target.layout.nq)
     for hinge in packed.user_scene.hinge:
-        converted[other.layout.hinges[hinge.name].q_slice] = q[
+        converted[target.layout.hinges[hinge.name].q_slice] = q[
             packed.layout.hinges[hinge.name].q_slice
         ]
     return converted

@@ -36,18 +36,20 @@ def row_mobilities(numbers: LoopWorkspace) -> Array:
     return mobility
 
 
-def _coupling_mobility(numbers: LoopWorkspace, one: WrittenCoupling, masses: _BodyMasses) -> float:
+def _coupling_mobility(
+    numbers: LoopWorkspace, coupling: WrittenCoupling, masses: _BodyMasses
+) -> float:
     """Mobility C^T D^-1 C of a coupling, summed over its hinges.
 
     D is that of the single body of the hinge; a closing hinge counts like its rows.
     """
     mobility, closures = 0.0, {closure.frame: closure for closure in numbers.records.closures}
-    for place in one.columns:
-        derivatives = numbers.coupling_derivatives(one, place)
-        if place not in closures:
-            mobility += _hinge_mobility(numbers.engine, place, derivatives, masses)
+    for tree_index in coupling.columns:
+        derivatives = numbers.coupling_derivatives(coupling, tree_index)
+        if tree_index not in closures:
+            mobility += _hinge_mobility(numbers.engine, tree_index, derivatives, masses)
             continue
-        closure = closures[place]
+        closure = closures[tree_index]
         for body, name in ((closure.inboard, "J_A"), (closure.outboard, "J_B")):
             if body >= 0:
                 column = derivatives @ numbers.closure_matrix(closure, name)[: len(derivatives)]
@@ -55,15 +57,17 @@ def _coupling_mobility(numbers: LoopWorkspace, one: WrittenCoupling, masses: _Bo
     return mobility
 
 
-def _hinge_mobility(engine: LoopedEngine, place: int, slopes: Array, masses: _BodyMasses) -> float:
-    body, lib = engine.packed.system.body(place), engine.lib
+def _hinge_mobility(
+    engine: LoopedEngine, tree_index: int, slopes: Array, masses: _BodyMasses
+) -> float:
+    body, lib = engine.packed.system.body(tree_index), engine.lib
     free_speeds = [k for k in range(body.nu) if not body.imposed[k]]
-    start = int(engine.packed.written.blocks[place]) + int(lib.MSTMM_BLOCK_FIXED)
+    start = int(engine.packed.written.blocks[tree_index]) + int(lib.MSTMM_BLOCK_FIXED)
     start += int(lib.MSTMM_SPEED_H_FREE) * body.nu
     motion_subspace = engine.workspace_array()[start : start + 6 * len(free_speeds)].reshape(
         6, len(free_speeds)
     )
-    inertia = motion_subspace.T @ masses.matrix(place) @ motion_subspace + np.diag(
+    inertia = motion_subspace.T @ masses.matrix(tree_index) @ motion_subspace + np.diag(
         np.array(body.rotor)[free_speeds]
     )
     return float(slopes[free_speeds] @ _pseudo_inverse(inertia) @ slopes[free_speeds])

@@ -263,9 +263,9 @@ def _continues_smoothly(calls: LoopCalls, q: Array, speeds: Array, level: Array)
 
 
 def _move_along(
-    calls: LoopCalls, q: Array, speeds: Array, way: float, level: Array
+    calls: LoopCalls, q: Array, speeds: Array, distance: float, level: Array
 ) -> Array | None:
-    """Move q (nq,) by `way` (rad, m) along projected speeds.
+    """Move q (nq,) by `distance` (rad, m) along projected speeds.
 
     Only rows with pivots above `level` are satisfied.  None if no speeds remain.
     """
@@ -275,9 +275,9 @@ def _move_along(
     length = float(np.abs(tangent).max(initial=0.0))
     if not length > 1e-9:
         return None
-    near_q = calls.move(q, tangent * (way / length))
-    factor = min(way / max(_largest_change(calls, near_q - q), _CLOSED_GAP), _MAX_CUT_FACTOR)
-    return calls.move(q, tangent * (factor * way / length)) if factor > 1.0 else near_q
+    near_q = calls.move(q, tangent * (distance / length))
+    factor = min(distance / max(_largest_change(calls, near_q - q), _CLOSED_GAP), _MAX_CUT_FACTOR)
+    return calls.move(q, tangent * (factor * distance / length)) if factor > 1.0 else near_q
 
 
 def _close(

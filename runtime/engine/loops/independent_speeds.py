@@ -86,13 +86,13 @@ class IndependentSpeeds:
             sorted(select_rows(remaining, shapes, _SELECTION_RATIO)[0])
         )
 
-    def motion_matrix(self, q: Array, places: Sequence[int]) -> Array:
-        """Matrix N (nu, n) of u = N v for the independent speeds v at the indices `places`.
+    def motion_matrix(self, q: Array, speed_indices: Sequence[int]) -> Array:
+        """Matrix N (nu, n) of u = N v for the independent speeds v at the indices `speed_indices`.
 
         Raises NumericalFailure if these do not determine the others, as at a dead centre, and in
         singular poses.
         """
-        motions, indices = self._motions(q), list(places)
+        motions, indices = self._motions(q), list(speed_indices)
         scaled_rows = motions[indices] / self.sizes[indices, None]
         row_count, motion_count = scaled_rows.shape
         is_branching = self._loops.singular and motion_count == self._loops.mobility
@@ -195,14 +195,14 @@ class IndependentSpeeds:
 
 
 def select_rows(
-    left: Array, places: Sequence[int], well: float = _SELECTION_RATIO
+    left: Array, row_indices: Sequence[int], well: float = _SELECTION_RATIO
 ) -> tuple[list[int], Array]:
     """Choose rows that distinguish motions (nu, n), orthonormal in characteristic scales.
 
-    Each row is the first of `places` that distinguishes the remaining motions at least 1 / `well`
+    Each row is the first of `row_indices` that separates the remaining motions at least 1 / `well`
     times as well as any other.  Also returns the motions in which no chosen row moves.
     """
-    candidates, selected = list(places), list[int]()
+    candidates, selected = list(row_indices), list[int]()
     for _ in range(left.shape[1]):
         row_norms = np.linalg.norm(left[candidates], axis=1)
         if not row_norms.max(initial=0.0) > 1 / _MAX_RATIO:
@@ -212,7 +212,7 @@ def select_rows(
     return selected, left
 
 
-def _motions_without(left: Array, place: int) -> Array:
+def _motions_without(left: Array, row_index: int) -> Array:
     """Motions (nu, n) without the component that changes one speed."""
-    direction = left[place] / np.linalg.norm(left[place])
+    direction = left[row_index] / np.linalg.norm(left[row_index])
     return np.asarray(left - np.outer(left @ direction, direction))

@@ -91,14 +91,18 @@ class LoopCalls(LoopWorkspace):
     def released_rows(self) -> list[int]:
         """Rows of hinges that are released according to `memory`."""
         releases = (int(self.model.rows[row].release) for row in range(self.count))
-        return [row for row, place in enumerate(releases) if place >= 0 and self.memory[place]]
+        return [
+            row
+            for row, memory_index in enumerate(releases)
+            if memory_index >= 0 and self.memory[memory_index]
+        ]
 
-    def solve_multipliers(self, q: Array, asked: Array, give: float) -> Array:
-        """Multipliers (rows,) of rows with errors `asked` and compliance `give`; see sweep.h."""
+    def solve_multipliers(self, q: Array, errors: Array, give: float) -> Array:
+        """Multipliers (rows,) of rows with errors `errors` and compliance `give`; see sweep.h."""
         engine, multipliers = self.engine, np.zeros(max(1, self.count))
         failure = engine.ffi.new("mstmm_failure *")
         code = engine.lib.mstmm_stressed(
-            self.model, engine.workspace(), give, engine.pointer(asked), engine.pointer(q),
+            self.model, engine.workspace(), give, engine.pointer(errors), engine.pointer(q),
             engine.pointer(self.memory), engine.pointer(multipliers), failure,
         )  # fmt: skip
         if code:

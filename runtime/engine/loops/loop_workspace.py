@@ -51,18 +51,18 @@ class LoopWorkspace:
         indices = [first + coupling.numbers for coupling in self.records.couplings]
         return self.engine.workspace_array()[indices]
 
-    def coupling_derivatives(self, one: WrittenCoupling, place: int) -> Array:
+    def coupling_derivatives(self, coupling: WrittenCoupling, tree_index: int) -> Array:
         """Derivatives -C (nu,) of a coupling with respect to the speeds of one of its hinges.
 
         Valid after a correction.
         """
-        start = self.records.offset + one.columns[place]
+        start = self.records.offset + coupling.columns[tree_index]
         return self.engine.workspace_array()[
-            start : start + self.engine.packed.system.body(place).nu
+            start : start + self.engine.packed.system.body(tree_index).nu
         ]
 
-    def closure_matrix(self, one: WrittenClosure, name: str) -> Array:
+    def closure_matrix(self, closure: WrittenClosure, name: str) -> Array:
         """Matrix (6, 6) of a closure after a correction: W, J_A or J_B."""
-        start = self.records.offset + one.numbers
+        start = self.records.offset + closure.numbers
         start += int(getattr(self.engine.lib, f"MSTMM_CLOSURE_{name}"))
         return self.engine.workspace_array()[start : start + 36].reshape(6, 6).copy()

@@ -146,9 +146,12 @@ def _end_rotation(scene: SceneTables, reference: str) -> Array:
     return np.eye(3) if index is None else np.array(scene.bodies[index].end_rotation(end_name))
 
 
-def _line_angle(one: Array, other: Array) -> float:
+def _line_angle(first_axis: Array, second_axis: Array) -> float:
     """Angle (rad) between two lines."""
-    return math.atan2(float(np.linalg.norm(np.cross(one, other))), abs(float(one @ other)))
+    return math.atan2(
+        float(np.linalg.norm(np.cross(first_axis, second_axis))),
+        abs(float(first_axis @ second_axis)),
+    )
 
 
 # --- messages -------------------------------------------------------------------------------------

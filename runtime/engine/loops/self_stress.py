@@ -62,10 +62,10 @@ def find_indeterminate_loads(
     )
 
 
-def outboard_axes(calls: LoopCalls, place: int) -> Array:
+def outboard_axes(calls: LoopCalls, tree_index: int) -> Array:
     """Outboard axes (3, 3) of the hinge at a tree index, in internal axes of its body."""
     packed = calls.engine.packed
-    hinge = packed.scene.hinges[packed.topology.scene_indices(place)[1]]
+    hinge = packed.scene.hinges[packed.topology.scene_indices(tree_index)[1]]
     return np.reshape(packed.end(hinge.outboard)[1], (3, 3))
 
 
@@ -95,17 +95,17 @@ def _load_sizes(calls: LoopCalls) -> Array:
     """Magnitudes of the load components (bodies, 6) of inboard hinges, in outboard axes."""
     packed = calls.engine.packed
     sizes = np.zeros((packed.system.count, 6))
-    for place in range(len(sizes)):
-        load = _load_at_origin(calls, place)
-        load[3:] += np.cross([0.0, 0.0, packed.system.body(place).height], load[:3])
-        axes = outboard_axes(calls, place)
-        sizes[place] = np.abs(np.concatenate([axes.T @ load[:3], axes.T @ load[3:]]))
+    for tree_index in range(len(sizes)):
+        load = _load_at_origin(calls, tree_index)
+        load[3:] += np.cross([0.0, 0.0, packed.system.body(tree_index).height], load[:3])
+        axes = outboard_axes(calls, tree_index)
+        sizes[tree_index] = np.abs(np.concatenate([axes.T @ load[:3], axes.T @ load[3:]]))
     return sizes
 
 
-def _load_at_origin(calls: LoopCalls, place: int) -> Array:
+def _load_at_origin(calls: LoopCalls, tree_index: int) -> Array:
     """Load f = S delta + e (6,) of a body from the last call, about its internal origin."""
-    lib, first = calls.engine.lib, int(calls.engine.packed.written.blocks[place])
+    lib, first = calls.engine.lib, int(calls.engine.packed.written.blocks[tree_index])
     block = calls.engine.workspace_array()[first:]
     S = np.zeros((6, 6))
     S[_UPPER_TRIANGLE] = block[lib.MSTMM_BLOCK_S : lib.MSTMM_BLOCK_S + 21]

@@ -156,8 +156,8 @@ class _Record:
 
     def _follow(self, engine: LoopedEngine, live: LiveInputs) -> None:
         if live.varies:
-            places: NDArray[np.int32] = live.indices
+            indices: NDArray[np.int32] = live.indices
             live_record = self._record.live
-            live_record.n, live_record.inputs = len(places), engine.packed.model.inputs
-            live_record.places = place_pointer = engine.ffi.from_buffer("int[]", places)
+            live_record.n, live_record.inputs = len(indices), engine.packed.model.inputs
+            live_record.places = place_pointer = engine.ffi.from_buffer("int[]", indices)
             self._references.append(place_pointer)

@@ -51,14 +51,14 @@ def find_unbalanced_motion(
 
 def _random_efforts(problem: EquilibriumProblem, q: Array, count: int, farthest: float) -> Array:
     """Efforts (k, n), J, at q and at random states around it, with k at most `count`."""
-    draw, found = np.random.default_rng(0), [problem.efforts(q)]
+    draw, effort_samples = np.random.default_rng(0), [problem.efforts(q)]
     for _ in range(_DRAWS * count):
-        if len(found) == count:
+        if len(effort_samples) == count:
             break
         distance = np.exp(draw.uniform(np.log(_NEAREST), np.log(farthest)))
         step = distance * draw.uniform(-1.0, 1.0, len(problem.sizes))
         try:
-            found.append(problem.efforts(problem.advance_state(q, step)))
+            effort_samples.append(problem.efforts(problem.advance_state(q, step)))
         except (NumericalFailure, SceneError):
             continue
-    return np.array(found)
+    return np.array(effort_samples)

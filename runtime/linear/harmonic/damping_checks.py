@@ -40,7 +40,7 @@ def reject_modal_damping(modal: Ratios) -> None:
 
 def reject_drives(pushes: Sequence[Channel], changed: bool) -> None:
     """Raise SceneError for drive motions if stiffness or inertia is `changed` from M, C, K."""
-    moved = next((one.name for one in pushes if one.drive_factors), "")
+    moved = next((channel.name for channel in pushes if channel.drive_factors), "")
     if changed and moved:
         raise SceneError(
             f'"{moved}": motions of drives cannot be combined with structural damping or exact '

@@ -87,8 +87,10 @@ def exact_modes(
     beams = exact_beams(linear, chosen, 0.0).without_damping()
     counter = _Counter(beams)
     omega = counter.natural_frequencies(count)
-    others = ("shapes", *CHANNEL_RISKS)
-    shapeless = DeferredRisks(lambda: (risk for risk in linear.risks if risk.name not in others))
+    excluded_risks = ("shapes", *CHANNEL_RISKS)
+    shapeless = DeferredRisks(
+        lambda: (risk for risk in linear.risks if risk.name not in excluded_risks)
+    )
     return DynamicStiffnessModes(
         omega, beams.linear.coordinate_names, counter.shapes(omega), findings=shapeless
     )
@@ -126,12 +128,12 @@ class _Counter:
 
     def _count_modes(self, omega: Array) -> Integers:
         for beside in (*_BESIDE, 0.0):
-            found = self.response.count_negative(-(omega**2))
-            if (found >= 0).all():
-                return found + self.beams.clamped_mode_count(omega)
-            omega = np.where(found < 0, omega * (1 + beside), omega)
+            counts = self.response.count_negative(-(omega**2))
+            if (counts >= 0).all():
+                return counts + self.beams.clamped_mode_count(omega)
+            omega = np.where(counts < 0, omega * (1 + beside), omega)
         raise NumericalFailure(
-            f"exact modes: singular factors near {omega[found < 0][0]:.9g} rad/s"
+            f"exact modes: singular factors near {omega[counts < 0][0]:.9g} rad/s"
         )
 
     def natural_frequencies(self, count: int) -> Array:
@@ -147,17 +149,17 @@ class _Counter:
                     f"count = {count}: the scene has no more than "
                     f"{self.below(np.array([high]))[0]} modes; request fewer"
                 )
-        wanted = np.arange(1, count + 1)
+        mode_numbers = np.arange(1, count + 1)
         lower, upper = np.full(count, low), np.full(count, high)
         still = self.below(np.array([low]))[0]
         while (upper - lower > _CLOSE * upper).any():
             middle, which = np.unique((lower + upper) / 2, return_inverse=True)
-            reached = self.below(middle)[which] >= wanted
+            reached = self.below(middle)[which] >= mode_numbers
             lower, upper = (
                 np.where(reached, lower, middle[which]),
                 np.where(reached, middle[which], upper),
             )
-        return np.where(wanted <= still, 0.0, (lower + upper) / 2)
+        return np.where(mode_numbers <= still, 0.0, (lower + upper) / 2)
 
     def shapes(self, omega: Array) -> Array:
         """Mode shapes (n, k): responses next to each frequency, one for each multiplicity."""
@@ -167,11 +169,11 @@ class _Counter:
         columns = np.zeros((most, self.response.engine.nu))
         columns[:, self.free] = np.random.default_rng(0).standard_normal((most, len(self.free)))
         answers, _, _ = self.response.amplitudes(near.astype(np.complex128) * 1j, columns)
-        found = [np.linalg.qr(answer[: last - first, self.free].real.T)[0]
+        vectors = [np.linalg.qr(answer[: last - first, self.free].real.T)[0]
                  for answer, (first, last) in zip(answers, runs, strict=True)]  # fmt: skip
-        shapes = np.concatenate(found, axis=1)
-        places = np.abs(shapes).argmax(axis=0)
-        return np.asarray(shapes / shapes[places, np.arange(len(omega))])
+        shapes = np.concatenate(vectors, axis=1)
+        largest_rows = np.abs(shapes).argmax(axis=0)
+        return np.asarray(shapes / shapes[largest_rows, np.arange(len(omega))])
 
 
 def _runs(omega: Array) -> list[tuple[int, int]]:

@@ -67,8 +67,8 @@ class ExactBeams:
     def _evaluate_beams(self, of: Callable[[HarmonicBeam], Any]) -> list[Any]:
         """Value of `of` for each beam, computed once for equal beams."""
         distinct = {id(beam): beam for beam in self.beams}
-        found = {key: of(beam) for key, beam in distinct.items()}
-        return [found[id(beam)] for beam in self.beams]
+        values_by_key = {key: of(beam) for key, beam in distinct.items()}
+        return [values_by_key[id(beam)] for beam in self.beams]
 
     def _stiffness(self, s: Complex) -> list[Complex]:
         return self._evaluate_beams(lambda beam: beam.stiffness(s))
@@ -118,11 +118,11 @@ def exact_beams(linear: LinearEquations, chosen: BeamSelection, losses: Losses) 
         data = beam_data(tables[name])
         held = boundary_conditions(around, tables[name], data)
         _check_beam(tables[name], data, [held.x, *(end.x for end in held.ends)])
-    found = _with_ends_as_shapes(linear, names)
-    lossy = loss_factor_lookup(found.model, losses)
-    beams = _distinct(found, tables, names, [lossy(name) for name in names])
-    _check_straight(found, linear, tables, names)
-    return ExactBeams(found, names, beams)
+    shaped = _with_ends_as_shapes(linear, names)
+    lossy = loss_factor_lookup(shaped.model, losses)
+    beams = _distinct(shaped, tables, names, [lossy(name) for name in names])
+    _check_straight(shaped, linear, tables, names)
+    return ExactBeams(shaped, names, beams)
 
 
 def _names(model: CompiledScene, chosen: BeamSelection) -> tuple[str, ...]:
@@ -146,9 +146,9 @@ def _names(model: CompiledScene, chosen: BeamSelection) -> tuple[str, ...]:
     return tuple(dict.fromkeys(chosen))
 
 
-def _check_beam(beam: Beam, data: BeamData, places: Sequence[float]) -> None:
+def _check_beam(beam: Beam, data: BeamData, positions: Sequence[float]) -> None:
     """Raise SceneError for beam properties that the solution does not cover."""
-    inner = [x for x in places if x not in (0.0, data.length)]
+    inner = [x for x in positions if x not in (0.0, data.length)]
     problem = ""
     if not data.uniform:
         problem = "is not uniform; divide it into uniform welded beams"
@@ -174,22 +174,24 @@ def _with_ends_as_shapes(linear: LinearEquations, names: Sequence[str]) -> Linea
     for beam in data["beam"]:
         if beam["name"] in names:
             _reshape(beam, model.flexible_bodies[beam["name"]].modes)
-    made = type(model)(scene_from_data(data, model.scene), model.known)
-    q = np.zeros(made.nq)
+    shaped_model = type(model)(scene_from_data(data, model.scene), model.known)
+    q = np.zeros(shaped_model.nq)
     hinges = min((slots.q for slots in model.coordinate_layout.modal.values()), default=model.nq)
     q[:hinges] = linear.state.q[:hinges]
     for name, slots in model.coordinate_layout.modal.items():
         if name not in names:
-            q[made.coordinate_layout.modal[name].q_slice] = linear.state.q[slots.q_slice]
-    still = np.zeros(made.nu)
-    _, a = made.looped.accelerations(
-        linear.state.t, q[None].copy(), still[None].copy(), made.looped.start_memory()[None]
+            q[shaped_model.coordinate_layout.modal[name].q_slice] = linear.state.q[slots.q_slice]
+    still = np.zeros(shaped_model.nu)
+    _, a = shaped_model.looped.accelerations(
+        linear.state.t, q[None].copy(), still[None].copy(), shaped_model.looped.start_memory()[None]
     )
-    dry = None if linear.dry is None else dry_friction(made, still, linear.dry.amplitudes)
+    dry = None if linear.dry is None else dry_friction(shaped_model, still, linear.dry.amplitudes)
     return replace(
-        linear, model=made, state=State(linear.state.t, q, still, a[0]), dry=dry,
-        input_channels=tuple(channel(made, one.name) for one in linear.input_channels),
-        disturbance_channels=tuple(channel(made, one.name) for one in linear.disturbance_channels),
+        linear, model=shaped_model, state=State(linear.state.t, q, still, a[0]), dry=dry,
+        input_channels=tuple(channel(shaped_model, given.name) for given in linear.input_channels),
+        disturbance_channels=tuple(
+            channel(shaped_model, given.name) for given in linear.disturbance_channels
+        ),
     )  # fmt: skip
 
 
@@ -208,16 +210,16 @@ def _distinct(
 ) -> tuple[HarmonicBeam, ...]:
     """Harmonic beams; equal beams share one object."""
     packed, known = linear.model.packed_scene, dict[tuple[object, ...], HarmonicBeam]()
-    found = []
+    beams = []
     for name, loss in zip(names, losses, strict=True):
-        place = packed.placements[name]
-        turn = np.array(place.rotation)
-        body = transform_body(packed.flexible[name], turn, np.array(place.origin))
+        placement = packed.placements[name]
+        turn = np.array(placement.rotation)
+        body = transform_body(packed.flexible[name], turn, np.array(placement.origin))
         beam = harmonic_beam(
             beam_data(tables[name]), body, turn.T, tables[name].damping.stiffness, loss
         )
-        found.append(known.setdefault(beam.cache_key, beam))
-    return tuple(found)
+        beams.append(known.setdefault(beam.cache_key, beam))
+    return tuple(beams)
 
 
 # --- rest -----------------------------------------------------------------------------------------

@@ -56,11 +56,11 @@ def stiffer(linear: LinearEquations, losses: Losses) -> LoopedEngine:
 
     laws = tuple(law for run in system.laws for law in change_laws(run, stiff))
     forces = tuple(
-        _stiffer_force(engine, force, state, lossy(one.name))
-        for force, one in zip(system.forces, engine.packed.scene.forces, strict=True)
+        _stiffer_force(engine, force, state, lossy(element.name))
+        for force, element in zip(system.forces, engine.packed.scene.forces, strict=True)
     )
-    made = replace(system, bodies=bodies, laws=laws, forces=forces)
-    return LoopedEngine(packed_system(made, engine.packed))
+    stiffer_system = replace(system, bodies=bodies, laws=laws, forces=forces)
+    return LoopedEngine(packed_system(stiffer_system, engine.packed))
 
 
 def loss_factor_lookup(model: CompiledScene, losses: Losses) -> Callable[[str], float]:
@@ -90,7 +90,7 @@ def _elastic(model: CompiledScene) -> Iterator[str]:
     """Names of elements that may have a loss factor."""
     packed = model.packed_scene
     yield from model.coordinate_layout.modal
-    yield from (one.name for one in packed.scene.forces)
+    yield from (force.name for force in packed.scene.forces)
     for run in packed.system.laws:
         for _, body, _, _ in run.iterate_laws():
             name = model.looped.hinge_name(body)
@@ -115,8 +115,8 @@ def _stiffer_shapes(model: CompiledScene, run: BodyRun, lossy: Callable[[str], f
 
 def _stiffer_law(law: LawNumbers, factor: float) -> LawNumbers:
     p = list(law.p)
-    for place in _STIFF[law.kernel]:
-        p[place] *= 1 + factor
+    for index in _STIFF[law.kernel]:
+        p[index] *= 1 + factor
     return replace(law, p=tuple(p))
 
 

@@ -71,17 +71,17 @@ def modal_damping(linear: LinearEquations, ratios: Ratios) -> ModalDamping:
         )
     if alone:
         check_dense_size(len(linear), "the matrix of all modes")
-    found = modes(linear, None if alone else len(zeta), False)
-    if not found.is_undamped or found.unstable.any():
+    undamped_modes = modes(linear, None if alone else len(zeta), False)
+    if not undamped_modes.is_undamped or undamped_modes.unstable.any():
         raise SceneError(
             "modal: damping ratios require undamped vibration modes, but this state is unstable or "
             "has follower loads; define damping in laws, or give structural"
         )
-    rates = 2 * zeta * found.omega
+    rates = 2 * zeta * undamped_modes.omega
     damped = np.flatnonzero(rates)
     if (
         linear.constrained_motion is not None
     ):  # the mass matrix of the sweep is that of the spanning tree
-        return ModalDamping(linear.M @ found.shapes[:, damped], rates[damped])
-    mass = [linear.operators.mass(found.shapes[:, k]) for k in damped]
+        return ModalDamping(linear.M @ undamped_modes.shapes[:, damped], rates[damped])
+    mass = [linear.operators.mass(undamped_modes.shapes[:, k]) for k in damped]
     return ModalDamping(np.array(mass).reshape(len(damped), len(linear)).T, rates[damped])

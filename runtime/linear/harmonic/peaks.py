@@ -54,12 +54,12 @@ def find_peaks(
 
     more = _frequencies_near_modes(centre[held], ratio[held], low, high)
     values = grid.magnitude.reshape(len(grid.omega), -1)[:, :count]
-    found = _refine_peaks(magnitudes, grid.omega, values, more)
+    peaks = _refine_peaks(magnitudes, grid.omega, values, more)
     for omega in centre[held & (ratio <= _UNDAMPED)]:
         near = magnitudes(omega * (1 + _NEAR * np.array([1.0, 2.0])))
         unbounded = near[0] > _POLE * near[1]
-        found.magnitude[unbounded], found.omega[unbounded] = np.inf, omega
-    return found
+        peaks.magnitude[unbounded], peaks.omega[unbounded] = np.inf, omega
+    return peaks
 
 
 def _frequencies_near_modes(centre: Array, ratio: Array, low: float, high: float) -> Array:

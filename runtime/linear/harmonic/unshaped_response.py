@@ -74,10 +74,10 @@ def unshaped_response_risks(
     share = np.divide(change, size, out=np.zeros_like(size), where=change > rounding)
     if (worst := float(share.max())) > _CHANGE:
         name, directions = next(iter(lacking.items()))
-        others = f" (and {len(lacking) - 1} more beams)" if len(lacking) > 1 else ""
+        more_beams_text = f" (and {len(lacking) - 1} more beams)" if len(lacking) > 1 else ""
         yield Risk(
             "shapes", f'"{name}"',
-            f'"{name}"{others} has no shapes of {" and ".join(directions)}: with them the '
+            f'"{name}"{more_beams_text} has no shapes of {" and ".join(directions)}: with them the '
             f"response changes by {worst:.0%}",
             f"add {', '.join(f'{d} = {_SHAPES}' for d in directions)} to its modes",
             worst, _CHANGE,
@@ -98,23 +98,27 @@ def _with_shapes(
             counts = Counter(mode.rstrip("0123456789") for mode in body.modes)
             beam["modes"] = {**counts, **dict.fromkeys(lacking[beam["name"]], _SHAPES)}
             beam["frame"] = body.frame
-    made = type(model)(scene_from_data(data, model.scene), model.known)
-    assert isinstance(made, Linearisable)
+    shaped_model = type(model)(scene_from_data(data, model.scene), model.known)
+    assert isinstance(shaped_model, Linearisable)
     amplitudes = None if linear.dry is None else linear.dry.amplitudes
-    return made.linearize(
-        _reorder_modes(state.q, "q_slice", model, made),
-        _reorder_modes(state.u, "u_slice", model, made), state.t,
-        inputs=[one.name for one in inputs], friction=amplitudes,
+    return shaped_model.linearize(
+        _reorder_modes(state.q, "q_slice", model, shaped_model),
+        _reorder_modes(state.u, "u_slice", model, shaped_model), state.t,
+        inputs=[channel.name for channel in inputs], friction=amplitudes,
     )  # fmt: skip
 
 
-def _reorder_modes(values: Array, part: str, model: CompiledScene, made: CompiledScene) -> Array:
-    """Coordinates or speeds of `model` in the order of `made`, zero for added shape functions."""
+def _reorder_modes(
+    values: Array, part: str, model: CompiledScene, shaped_model: CompiledScene
+) -> Array:
+    """Coordinates or speeds of `model` in the order of `shaped_model`, zero for added shapes."""
     slices = [getattr(slots, part) for slots in model.coordinate_layout.modal.values()]
-    hinges = min(one.start for one in slices)
+    hinges = min(part_slice.start for part_slice in slices)
     pieces = [values[:hinges]]
-    for name in made.coordinate_layout.modal:
+    for name in shaped_model.coordinate_layout.modal:
         own = values[getattr(model.coordinate_layout.modal[name], part)]
         modes = dict(zip(model.flexible_bodies[name].modes, own, strict=True))
-        pieces.append(np.array([modes.get(mode, 0.0) for mode in made.flexible_bodies[name].modes]))
+        pieces.append(
+            np.array([modes.get(mode, 0.0) for mode in shaped_model.flexible_bodies[name].modes])
+        )
     return np.concatenate(pieces)

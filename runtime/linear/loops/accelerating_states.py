@@ -48,19 +48,23 @@ class Motion:
 
     @classmethod
     def from_derivatives(
-        cls, slopes: Mapping[str, Array], places: Sequence[int], ways: Array
+        cls, slopes: Mapping[str, Array], speed_indices: Sequence[int], motion_basis: Array
     ) -> Motion:
         """Build from derivatives (nu, nu) of accelerations that keep the loops closed.
 
-        `slopes` has the names of `Derivatives`, `places` are the indices of the n independent
-        speeds, `ways` is N (nu, n).
+        `slopes` has the names of `Derivatives`, `speed_indices` are those of the n independent
+        speeds, `motion_basis` is N (nu, n).
         """
-        own, by_speed, turned = list(places), slopes["u"] @ ways, slopes["rate_q"] @ ways
-        bent = by_speed - ways @ by_speed[own]
-        swept = (bent - turned + ways @ turned[own]) / 2
-        by_place = slopes["q"] @ ways + slopes["u"] @ swept
+        own, by_speed, turned = (
+            list(speed_indices),
+            slopes["u"] @ motion_basis,
+            slopes["rate_q"] @ motion_basis,
+        )
+        bent = by_speed - motion_basis @ by_speed[own]
+        swept = (bent - turned + motion_basis @ turned[own]) / 2
+        by_place = slopes["q"] @ motion_basis + slopes["u"] @ swept
         turning = turned[own] if turned.any() else None
-        shifted = by_place - ways @ by_place[own]
+        shifted = by_place - motion_basis @ by_place[own]
         return cls(swept, by_speed[own], by_place[own], bent, shifted, turning)
 
     def matrices(self, mass: Array) -> Matrices:

@@ -81,15 +81,15 @@ class ConstrainedLinearisation:
 
     def matrices(self, engine: LoopedEngine, state: State) -> Matrices:
         """Matrices M, C, K along x for the tree, or for an engine of it with other elements."""
-        found = self._project(engine, state)
+        projected = self._project(engine, state)
         if self.motion is None:
-            return Matrices(found.M, found.C, found.K + self.constraint_stiffness)
-        whole = self.motion.matrices(found.M)
+            return Matrices(projected.M, projected.C, projected.K + self.constraint_stiffness)
+        whole = self.motion.matrices(projected.M)
         rough = self.tree_with_friction or self.tree
         if engine is rough:
             return whole
         tree = self._project(rough, state)  # the constraint loads are the same for both
-        return Matrices(found.M, whole.C + found.C - tree.C, whole.K + found.K - tree.K)
+        return Matrices(projected.M, whole.C + projected.C - tree.C, whole.K + projected.K - tree.K)
 
     def _project(self, engine: LoopedEngine, state: State) -> Matrices:
         swept = None if self.motion is None else self.motion.swept
@@ -99,17 +99,17 @@ class ConstrainedLinearisation:
 
     def input_matrix(self, state: State, channels: Sequence[Channel]) -> Array:
         """Efforts (n, channels) along x for a unit of each input; for drives, of acceleration."""
-        every, found = (
+        every, columns_found = (
             list(range(len(self.motion_basis))),
             np.zeros((len(self.independent_indices), len(channels))),
         )
-        still = [k for k, one in enumerate(channels) if one.drive < 0]
+        still = [k for k, given in enumerate(channels) if given.drive < 0]
         pushes = [channels[k] for k in still]
-        found[:, still] = self.motion_basis.T @ columns(self.tree, state, pushes, every)
-        for k, one in enumerate(channels):
-            if one.drive >= 0:
-                found[:, k] = -self.drive_columns(state, one.drive_factors).inertia
-        return found
+        columns_found[:, still] = self.motion_basis.T @ columns(self.tree, state, pushes, every)
+        for k, given in enumerate(channels):
+            if given.drive >= 0:
+                columns_found[:, k] = -self.drive_columns(state, given.drive_factors).inertia
+        return columns_found
 
     def drive_columns(self, state: State, moves: DriveFactors) -> Columns:
         """Columns (n,) along x of stiffness, damping and inertia for drives moved by one input."""
@@ -151,15 +151,17 @@ class ConstrainedLinearisation:
 
         The entries of x and of drives are at the indices of their speeds.
         """
-        found, places = dict[int, Array](), list(self.independent_indices)
+        rows_by_order, speed_indices = dict[int, Array](), list(self.independent_indices)
         for order, wide in orders.items():
-            rows = found.setdefault(order, np.zeros_like(wide))
-            rows[:, places] += wide @ self.motion_basis
+            rows = rows_by_order.setdefault(order, np.zeros_like(wide))
+            rows[:, speed_indices] += wide @ self.motion_basis
             for speed in drives:
                 rows[:, speed] += wide @ self._drive_motion(state, speed)
             for lower, along in () if self.motion is None else self.motion.lower_order_terms(order):
-                found.setdefault(lower, np.zeros_like(wide))[:, places] += wide @ along
-        return found
+                rows_by_order.setdefault(lower, np.zeros_like(wide))[:, speed_indices] += (
+                    wide @ along
+                )
+        return rows_by_order
 
 
 def mechanism_at(
@@ -174,23 +176,26 @@ def mechanism_at(
     """
     if model.independent_speeds is None:
         return None
-    found = _mechanism(model, state, model.independent_speeds.select(state.q), dry)
-    tree, free, ways = found.tree, found.free, found.motion_basis
+    mechanism = _mechanism(model, state, model.independent_speeds.select(state.q), dry)
+    tree, free, motion_basis = mechanism.tree, mechanism.free, mechanism.motion_basis
     carried = _projected_matrices(
-        model.looped, state, free, ways, _zero_cut_hinge_rows(model, ways)
+        model.looped, state, free, motion_basis, _zero_cut_hinge_rows(model, motion_basis)
     ).K
     return replace(
-        found, constraint_stiffness=carried - _projected_matrices(tree, state, free, ways, ways).K
+        mechanism,
+        constraint_stiffness=carried
+        - _projected_matrices(tree, state, free, motion_basis, motion_basis).K,
     )
 
 
 def mechanism_in_motion(
-    model: CompiledScene, state: State, slopes: Slopes, places: tuple[int, ...] | None = None,
+    model: CompiledScene, state: State, slopes: Slopes,
+    speed_indices: tuple[int, ...] | None = None,
     dry: DryFriction | None = None,
 ) -> ConstrainedLinearisation | None:  # fmt: skip
     """Linearisation of the closed loops at a moving or accelerating state; None for a tree.
 
-    The independent speeds are those at the indices `places`, by default a well-conditioned choice.
+    The independent speeds have the indices `speed_indices`, by default a well-conditioned choice.
     Viscous dampers replace `dry` friction.
 
     Raises SceneError for scenes whose accelerations have no derivatives, NumericalFailure as
@@ -198,30 +203,32 @@ def mechanism_in_motion(
     """
     if model.independent_speeds is None:
         return None
-    found = _mechanism(model, state, places or model.independent_speeds.select(state.q), dry)
+    mechanism = _mechanism(
+        model, state, speed_indices or model.independent_speeds.select(state.q), dry
+    )
     return replace(
-        found,
+        mechanism,
         motion=Motion.from_derivatives(
-            slopes(state), found.independent_indices, found.motion_basis
+            slopes(state), mechanism.independent_indices, mechanism.motion_basis
         ),
         slopes=slopes,
     )
 
 
 def _mechanism(
-    model: CompiledScene, state: State, places: tuple[int, ...], dry: DryFriction | None
+    model: CompiledScene, state: State, speed_indices: tuple[int, ...], dry: DryFriction | None
 ) -> ConstrainedLinearisation:
     """Linearisation without the effects of constraint loads and of motion."""
     freedom = model.independent_speeds
     assert freedom is not None
-    ways, n = freedom.motion_matrix(state.q, places), len(places)
+    motion_basis, n = freedom.motion_matrix(state.q, speed_indices), len(speed_indices)
     rough, tree = torn_trees(model, dry)
     return ConstrainedLinearisation(
         model,
         tree,
         model.free_speed_indices,
-        places,
-        ways,
+        speed_indices,
+        motion_basis,
         np.zeros((n, n)),
         tree_with_friction=rough,
         dry=dry,
@@ -240,21 +247,27 @@ def torn_trees(model: CompiledScene, dry: DryFriction | None) -> tuple[LoopedEng
 
 
 def _projected_matrices(
-    engine: LoopedEngine, state: State, free: tuple[int, ...], ways: Array, rows: Array,
+    engine: LoopedEngine, state: State, free: tuple[int, ...], motion_basis: Array, rows: Array,
     swept: Array | None = None,
 ) -> Matrices:  # fmt: skip
     """Projected matrices rows^T (M, C, K) ways; K includes the change `swept` of speeds with x."""
-    found, n, left = matrices(engine, state, list(free)), ways[list(free)], rows[list(free)]
-    mass, damping, stiffness = (left.T @ matrix @ n for matrix in (found.M, found.C, found.K))
+    tree_matrices, n, left = (
+        matrices(engine, state, list(free)),
+        motion_basis[list(free)],
+        rows[list(free)],
+    )
+    mass, damping, stiffness = (
+        left.T @ matrix @ n for matrix in (tree_matrices.M, tree_matrices.C, tree_matrices.K)
+    )
     if swept is not None:
-        stiffness = stiffness + left.T @ found.C @ swept[list(free)]
+        stiffness = stiffness + left.T @ tree_matrices.C @ swept[list(free)]
     return Matrices(mass, damping, stiffness)
 
 
-def _zero_cut_hinge_rows(model: CompiledScene, motions: Array) -> Array:
-    """Motions (nu, n) with zero rows for cut hinges, whose loads act on their bodies instead."""
-    system, rows = model.packed_scene.system, motions.copy()
-    for one in system.closures:
-        first = int(system.first_indices["u"][one.frame])
-        rows[first : first + system.body(one.frame).nu] = 0.0
+def _zero_cut_hinge_rows(model: CompiledScene, motion_basis: Array) -> Array:
+    """`motion_basis` (nu, n) with zero rows for cut hinges, whose loads act on their bodies."""
+    system, rows = model.packed_scene.system, motion_basis.copy()
+    for closure in system.closures:
+        first = int(system.first_indices["u"][closure.frame])
+        rows[first : first + system.body(closure.frame).nu] = 0.0
     return rows

@@ -40,8 +40,8 @@ _ROUNDING = 1e-9
 def has_speed_rows(model: CompiledScene) -> bool:
     """Whether the scene has nonholonomic rows: rolling discs, couplings of speeds."""
     scene = model.packed_scene.user_scene
-    return any(one.type == ROLLING for one in scene.constraint) or any(
-        one.speeds is not None for one in scene.coupling
+    return any(constraint.type == ROLLING for constraint in scene.constraint) or any(
+        coupling.speeds is not None for coupling in scene.coupling
     )
 
 
@@ -78,13 +78,16 @@ class RollingMechanism(ConstrainedLinearisation):
 
         `rotation` (nu, nu) maps from the axes of the bodies at q to the frames.
         """
-        freedom, places = self.model.independent_speeds, list(self.speed_indices)
+        freedom, speed_indices = self.model.independent_speeds, list(self.speed_indices)
         assert freedom is not None
         wished = rotation.T @ u
-        found = freedom.remove_velocity_errors(q, wished)
-        ways = rotation @ freedom.motion_matrix(q, places)
-        missed = (rotation @ (wished - found))[places]
-        return np.asarray(found + rotation.T @ (ways @ np.linalg.solve(ways[places], missed)))
+        corrected_speeds = freedom.remove_velocity_errors(q, wished)
+        motions = rotation @ freedom.motion_matrix(q, speed_indices)
+        missed = (rotation @ (wished - corrected_speeds))[speed_indices]
+        return np.asarray(
+            corrected_speeds
+            + rotation.T @ (motions @ np.linalg.solve(motions[speed_indices], missed))
+        )
 
     def rows(self, state: State, orders: Mapping[int, Array], drives: object) -> dict[int, Array]:
         """Output rows (k, nu), unchanged: along all perturbations, speeds and accelerations."""
@@ -103,11 +106,11 @@ class RollingMechanism(ConstrainedLinearisation):
         )
 
 
-def reject_second_order(found: RollingMechanism) -> NoReturn:
+def reject_second_order(rolling: RollingMechanism) -> NoReturn:
     """Raise SceneError for M, C, K and quantities derived from them."""
     raise SceneError(
         "linear model: M, C, K, V and W do not exist with velocity constraints, which leave "
-        f"{len(found.independent_indices)} positions and {len(found.speed_indices)} speeds "
+        f"{len(rolling.independent_indices)} positions and {len(rolling.speed_indices)} speeds "
         "independent; use A, B and states"
     )
 
@@ -143,10 +146,10 @@ def rolling_at(
             tuple(sorted(select_rows(motions, lasting)[0])),
         )
     positions, speeds = own
-    ways = basis * freedom.sizes[:, None]
-    ways = ways @ np.linalg.inv(ways[list(positions)])
+    motion_basis = basis * freedom.sizes[:, None]
+    motion_basis = motion_basis @ np.linalg.inv(motion_basis[list(positions)])
     speed_ways = freedom.motion_matrix(state.q, speeds)
-    swept = rows.swept(ways, state.u)
+    swept = rows.swept(motion_basis, state.u)
     swept -= speed_ways @ swept[list(speeds)]
     nothing = np.zeros((len(positions), len(positions)))
     rough, tree = torn_trees(model, dry)
@@ -155,7 +158,7 @@ def rolling_at(
         tree,
         model.free_speed_indices,
         positions,
-        ways,
+        motion_basis,
         nothing,
         tree_with_friction=rough,
         dry=dry,
@@ -170,7 +173,9 @@ class _Rows:
 
     def __init__(self, freedom: IndependentSpeeds, q: Array) -> None:
         self._freedom, self._q, self._sizes = freedom, q, freedom.sizes
-        self._J = np.array([freedom.velocity_errors(q, one) for one in np.eye(len(self._sizes))]).T
+        self._J = np.array(
+            [freedom.velocity_errors(q, unit_speeds) for unit_speeds in np.eye(len(self._sizes))]
+        ).T
         of_speeds = freedom.speed_rows
         self.position_rows = [k for k in range(len(self._J)) if k not in of_speeds]
 
@@ -180,32 +185,32 @@ class _Rows:
         scaled = (self._J * self._sizes)[np.ix_(rows, free)]
         _, lengths, across = np.linalg.svd(scaled)
         rank = int((lengths > _ROUNDING * lengths.max(initial=0.0)).sum())
-        found = np.zeros((len(self._sizes), len(free) - rank))
-        found[free] = across[rank:].T
-        return found
+        basis = np.zeros((len(self._sizes), len(free) - rank))
+        basis[free] = across[rank:].T
+        return basis
 
-    def swept(self, ways: Array, u: Array) -> Array:
-        """Changes of speed (nu, n) that keep J u zero along perturbations `ways` (nu, n)."""
+    def swept(self, motions: Array, u: Array) -> Array:
+        """Changes of speed (nu, n) that keep J u zero along perturbations `motions` (nu, n)."""
         free = self._freedom.free_indices
         changes = np.reshape(
-            [self._directional_derivative(way, u) for way in ways.T], (-1, len(self._J))
+            [self._directional_derivative(motion, u) for motion in motions.T], (-1, len(self._J))
         ).T
         scaled = (self._J * self._sizes)[:, free]
-        found = np.zeros_like(ways)
-        found[free] = -np.linalg.lstsq(scaled, changes, rcond=_ROUNDING)[0]
-        return np.asarray(found * self._sizes[:, None])
+        result = np.zeros_like(motions)
+        result[free] = -np.linalg.lstsq(scaled, changes, rcond=_ROUNDING)[0]
+        return np.asarray(result * self._sizes[:, None])
 
-    def _directional_derivative(self, way: Array, u: Array) -> Array:
+    def _directional_derivative(self, motion: Array, u: Array) -> Array:
         """Derivative (rows,) of J u along a perturbation (nu,), with the most consistent step."""
-        size = float(np.abs(way / self._sizes).max())
-        tried = [self._difference(way, u, step / size) for step in _STEPS]
+        size = float(np.abs(motion / self._sizes).max())
+        tried = [self._difference(motion, u, step / size) for step in _STEPS]
         apart = [np.abs(a - b).max(initial=0.0) for a, b in pairwise(tried)]
         return tried[int(np.argmin(apart))]
 
-    def _difference(self, way: Array, u: Array, step: float) -> Array:
-        found = np.zeros(len(self._J))
+    def _difference(self, motion: Array, u: Array, step: float) -> Array:
+        difference = np.zeros(len(self._J))
         for count, weight in _WEIGHTS.items():
             for sign in (1.0, -1.0):
-                q = self._freedom.move(self._q, sign * count * step * way)
-                found += sign * weight / step * self._freedom.velocity_errors(q, u)
-        return found
+                q = self._freedom.move(self._q, sign * count * step * motion)
+                difference += sign * weight / step * self._freedom.velocity_errors(q, u)
+        return difference

@@ -25,8 +25,8 @@ def eigenpairs(a: Array) -> tuple[Complex, Complex]:
     vectors = np.zeros((len(a), len(values)), dtype=np.complex128)
     vectors[core] = own
     moving = values != 0
-    for place in reversed(ignorable):
-        vectors[place, moving] = (a[place] @ vectors)[moving] / values[moving]
+    for index in reversed(ignorable):
+        vectors[index, moving] = (a[index] @ vectors)[moving] / values[moving]
     values = np.concatenate([np.zeros(len(ignorable)), values])
     vectors = np.hstack([np.eye(len(a))[:, ignorable], vectors])
     kept = np.flatnonzero(values.imag >= 0)
@@ -76,10 +76,10 @@ def coupled_states(a: Array) -> tuple[list[int], list[int]]:
     """
     core, ignorable, scaled = list(range(len(a))), list[int](), np.abs(_scale_rows(a))
     while True:
-        for place in core:
-            if scaled[core, place].max(initial=0.0) <= _NOTHING:
+        for index in core:
+            if scaled[core, index].max(initial=0.0) <= _NOTHING:
                 break
         else:
             return core, ignorable
-        core.remove(place)
-        ignorable.append(place)
+        core.remove(index)
+        ignorable.append(index)

@@ -141,7 +141,7 @@ class NonholonomicLinear(Linear):
     @cached_property
     def _slopes(self) -> Mapping[str, Array]:
         """Derivatives of rates and accelerations, with dry friction as in the model."""
-        found, rolling = dict(self.slopes(self.state)), self._rolling
+        slopes, rolling = dict(self.slopes(self.state)), self._rolling
         if self.dry and rolling.tree_with_friction is not None:
             free, left = list(rolling.free), np.zeros((self.model.nu, self.model.nu))
             rough, smooth = (
@@ -149,8 +149,8 @@ class NonholonomicLinear(Linear):
                 for tree in (rolling.tree_with_friction, rolling.tree)
             )
             left[np.ix_(free, free)] = rough - smooth
-            found["u"] = found["u"] + found["efforts"] @ left
-        return found
+            slopes["u"] = slopes["u"] + slopes["efforts"] @ left
+        return slopes
 
     @property
     def frame_rotation(self) -> Array:
@@ -188,12 +188,12 @@ class NonholonomicLinear(Linear):
 
     def _effect(self, pushes: Sequence[Channel]) -> Array:
         """Input matrix (n + m, inputs) of some inputs."""
-        if any(one.drive >= 0 for one in pushes):
+        if any(given.drive >= 0 for given in pushes):
             self._rolling.drive_columns()
         nu, tree = self.model.nu, self._rolling.tree
         answers = self._slopes["efforts"] @ columns(tree, self.state, pushes, list(range(nu)))
-        found = self._state_rotation @ np.vstack([np.zeros_like(answers), answers])
-        return np.asarray(found[self._rolling.state_indices])
+        effect = self._state_rotation @ np.vstack([np.zeros_like(answers), answers])
+        return np.asarray(effect[self._rolling.state_indices])
 
     def _matrices_of(self, *_: object) -> NoReturn:
         reject_second_order(self._rolling)
@@ -236,8 +236,8 @@ class NonholonomicLinear(Linear):
         scale = np.where(largest == 0, 1.0, largest)
         increments, speeds = np.split(self._state_rotation.T @ self._basis @ (vectors / scale), 2)
         moved = np.where(speeds.any(axis=0), speeds, increments)
-        found = NonholonomicModes(self, values, shapes / scale, True, moved)
-        return found if count is None else found.lowest(int(count))
+        modes_found = NonholonomicModes(self, values, shapes / scale, True, moved)
+        return modes_found if count is None else modes_found.lowest(int(count))
 
     def frequency_response(
         self,
@@ -264,10 +264,11 @@ class NonholonomicLinear(Linear):
         self._check_steady(pushes, shown)
         b = self._effect(pushes)
         c, d = self.state_output_matrices(rows_of(self, shown, pushes), b)
-        values = np.array([c @ self._solve(one, b) + d for one in frequencies])
+        values = np.array([c @ self._solve(frequency, b) + d for frequency in frequencies])
         return FrequencyResponse(
-            frequencies, tuple(one.name for one in pushes), tuple(one.name for one in shown),
-            tuple(one.unit for one in pushes), tuple(one.unit for one in shown), values,
+            frequencies,
+            tuple(channel.name for channel in pushes), tuple(entry.name for entry in shown),
+            tuple(channel.unit for channel in pushes), tuple(entry.unit for entry in shown), values,
             DeferredRisks(lambda: find_response_risks(self, pushes, outputs is not None)),
         )  # fmt: skip
 
@@ -315,29 +316,34 @@ class NonholonomicLinear(Linear):
     @property
     def _independent_motions(self) -> IndependentMotions:
         """Motions along the independent speeds."""
-        layout, rolling, places = (
+        layout, rolling, speed_indices = (
             self.model.coordinate_layout,
             self._rolling,
             list(self._rolling.speed_indices),
         )
-        hinges = [layout.hinge_of_speed(k) for k in places]
-        units = [h.u_units[k - h.u].removesuffix("/s") for h, k in zip(hinges, places, strict=True)]
+        hinges = [layout.hinge_of_speed(k) for k in speed_indices]
+        units = [
+            h.u_units[k - h.u].removesuffix("/s")
+            for h, k in zip(hinges, speed_indices, strict=True)
+        ]
         along = rolling.speed_basis
         return IndependentMotions(
-            self.speeds, units, speed_scales(self.model)[places], lambda x: along @ x,
+            self.speeds, units, speed_scales(self.model)[speed_indices], lambda x: along @ x,
             lambda efforts: along.T @ efforts,
         )  # fmt: skip
 
     def _accelerating_speeds(self) -> list[str]:
         """Names of independent speeds that change in the frames, at this or the later state."""
-        found, sizes = list[str](), speed_scales(self.model)
-        for one in (self, self._later):
-            state, places = one.state, [*self._rolling.speed_indices]
-            left = (one.frame_rotation @ (state.udot + self.frames.generator @ state.u))[places]
+        names, sizes = list[str](), speed_scales(self.model)
+        for model in (self, self._later):
+            state, speed_indices = model.state, [*self._rolling.speed_indices]
+            left = (model.frame_rotation @ (state.udot + self.frames.generator @ state.u))[
+                speed_indices
+            ]
             bound = _STILL + _ROUNDING * float(np.square(state.u / sizes).max(initial=0.0))
-            leaving = np.flatnonzero(np.abs(left) > bound * sizes[places])
-            found += [self.model.coordinate_layout.u_name(places[k]) for k in leaving]
-        return list(dict.fromkeys(found))
+            leaving = np.flatnonzero(np.abs(left) > bound * sizes[speed_indices])
+            names += [self.model.coordinate_layout.u_name(speed_indices[k]) for k in leaving]
+        return list(dict.fromkeys(names))
 
     def _has_changing_matrix(self) -> bool:
         """Whether A differs at the later state, except for ignorable coordinates."""
@@ -359,16 +365,16 @@ class NonholonomicLinear(Linear):
         """Raise SceneError where matrices, inputs or outputs change along the motion."""
         changing, there = [*self._accelerating_speeds()], self._later
         changing += ["the matrices"] if self._has_changing_matrix() else []
-        now, then = (one._effect(pushes) for one in (self, there))
+        now, then = (model._effect(pushes) for model in (self, there))
         changing += [
             x.name
             for k, x in enumerate(pushes)
             if relative_difference(now[:, k], then[:, k]) > SAME
         ]
-        others = outputs_of(there, [one.name for one in shown])
+        later_quantities = outputs_of(there, [quantity.name for quantity in shown])
         read, later = (
-            one.state_output_matrices(rows_of(one, some, pushes), b)[0]
-            for one, some, b in ((self, shown, now), (there, others, then))
+            model.state_output_matrices(rows_of(model, some, pushes), b)[0]
+            for model, some, b in ((self, shown, now), (there, later_quantities, then))
         )
         changing += [
             x.name for k, x in enumerate(shown) if relative_difference(read[k], later[k]) > SAME
@@ -438,11 +444,11 @@ def _ahead(linear: NonholonomicLinear) -> tuple[State, Array]:
         return np.asarray(engine.rates(state.t + time, at, speeds(time, at), memory))
 
     for k in range(_STEPS):  # classical fourth-order Runge-Kutta method
-        one = rates(k * h, q)
-        two = rates((k + 0.5) * h, q + h / 2 * one)
+        change_of_q = rates(k * h, q)
+        two = rates((k + 0.5) * h, q + h / 2 * change_of_q)
         three = rates((k + 0.5) * h, q + h / 2 * two)
         four = rates((k + 1) * h, q + h * three)
-        q = q + h / 6 * (one + 2 * two + 2 * three + four)
+        q = q + h / 6 * (change_of_q + 2 * two + 2 * three + four)
     whole = SceneSystem(engine).start(state.t + dt, q, speeds(dt, q))
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
     _, a = engine.accelerations(state.t + dt, q[None].copy(), u[None].copy(), memory[None])

@@ -59,7 +59,7 @@ def find_departure(linear: LinearEquations, later: LaterStates | None = None) ->
     """
     states = [linear.state, *(() if later is None else later.all_states)]
     free = list(linear.free_speed_indices)
-    a = np.array([one.udot[free] for one in states]).T
+    a = np.array([later_state.udot[free] for later_state in states]).T
     if not a.any():
         return None
     sizes = speed_scales(linear.model)[free]

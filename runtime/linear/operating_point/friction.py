@@ -74,11 +74,11 @@ class DryFriction:
         first = self.model.packed_scene.system.first_indices["u"]
 
         def replace_law(law: LawNumbers, body: int) -> LawNumbers:
-            one = self.sticking.get(int(first[body]) + law.speed)
-            if one is None or law.kernel != _KERNEL:
+            sticking = self.sticking.get(int(first[body]) + law.speed)
+            if sticking is None or law.kernel != _KERNEL:
                 return law
             p = list(law.p)
-            p[_DAMPING] = p[_DAMPING] + one.damping
+            p[_DAMPING] = p[_DAMPING] + sticking.damping
             p[_COULOMB] = p[_STATIC] = 0.0
             return replace(law, p=tuple(p))
 
@@ -87,8 +87,8 @@ class DryFriction:
     def engine(self, model: CompiledScene) -> LoopedEngine:
         """Looped engine of the model, or of its variant with other parameters, with these laws."""
         packed = model.packed_scene
-        made = replace(packed.system, laws=self.replace_friction(packed.system.laws))
-        return LoopedEngine(packed_system(made, packed))
+        changed_system = replace(packed.system, laws=self.replace_friction(packed.system.laws))
+        return LoopedEngine(packed_system(changed_system, packed))
 
 
 def change_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) -> Iterator[LawRun]:
@@ -97,7 +97,8 @@ def change_laws(run: LawRun, change: Callable[[LawNumbers, int], LawNumbers]) ->
     The run keeps its pattern if all its repeats change equally; else each law becomes a run.
     """
     every = [
-        (change(law, body), body, twist, places) for law, body, twist, places in run.iterate_laws()
+        (change(law, body), body, twist, speed_indices)
+        for law, body, twist, speed_indices in run.iterate_laws()
     ]
     width = len(run.pattern)
     pattern = [law for law, _, _, _ in every[:width]]
@@ -126,11 +127,11 @@ def dry_friction(model: CompiledScene, u: Array, amplitudes: Amplitudes) -> DryF
         if law.kernel == _KERNEL and law.p[_STATIC]
     }  # fmt: skip
     amplitude_of = _amplitudes(model, amplitudes, list(acting))
-    found = {
+    hinges = {
         speed: _sticking_friction(speed, p, amplitude_of(speed)) for speed, p in acting.items()
         if speed in free and abs(u[speed]) <= _SLIDING * p[_WIDTH]
     }  # fmt: skip
-    return DryFriction(model, found, amplitudes)
+    return DryFriction(model, hinges, amplitudes)
 
 
 def _sticking_friction(
@@ -174,10 +175,10 @@ def _names(speed: str) -> tuple[str, str, str]:
 
 
 def _amplitude(what: str, value: float) -> float:
-    found = finite_float(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
-    if found <= 0:
+    amplitude = finite_float(what, value, "an amplitude of speed in rad/s or m/s, such as 0.1")
+    if amplitude <= 0:
         raise SceneError(
-            f"{what} = {found:g}: expected an amplitude of speed above 0 in rad/s or m/s; leave it "
-            "out for a model without dry friction"
+            f"{what} = {amplitude:g}: expected an amplitude of speed above 0 in rad/s or m/s; "
+            "leave it out for a model without dry friction"
         )
-    return found
+    return amplitude

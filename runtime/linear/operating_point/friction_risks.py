@@ -41,11 +41,15 @@ _LISTED, _SOFT = 4, 1e-12
 
 def friction_risks(linear: LinearEquations) -> Iterator[Risk]:
     """Risk for all hinges whose friction is omitted: the amplitude below which they stick."""
-    left = [one for one in linear.dry.sticking.values() if not one.is_given] if linear.dry else []
+    left = (
+        [friction for friction in linear.dry.sticking.values() if not friction.is_given]
+        if linear.dry
+        else []
+    )
     if not left:
         return
     amplitudes = _sticking_amplitudes(linear, left)
-    sizes = speed_scales(linear.model)[[one.speed for one in left]]
+    sizes = speed_scales(linear.model)[[friction.speed for friction in left]]
     order = np.argsort(-amplitudes / sizes, kind="stable")
     layout, worst = linear.model.coordinate_layout, int(order[0])
     listed = [
@@ -99,19 +103,19 @@ def independent_motions(linear: LinearEquations) -> IndependentMotions:
     )
 
 
-def saturation_risks(linear: LinearEquations, ways: IndependentMotions) -> Iterator[Risk]:
+def saturation_risks(linear: LinearEquations, motions: IndependentMotions) -> Iterator[Risk]:
     """Risks of coordinates with friction by an expression.
 
     These have an effort that jumps with speed at the state, such as -10*sign(u), or damping that
     saturates above low speeds, such as -10*tanh(u/0.001).
     """
-    n = len(ways.sizes)
+    n = len(motions.sizes)
     if not n:
         return
     signs = (
         np.eye(n) if n <= _SINGLE else np.array([1 - 2 * (np.arange(n) // k % 2) for k in _RUNS])
     )
-    work = _work(linear, ways, signs)
+    work = _work(linear, motions, signs)
     mass = np.maximum(np.abs(work(0.0)).max(axis=0), np.finfo(float).tiny)
     first, jumps = (work(part) for part in _NEAR)
     steady = np.abs(first - jumps) < _STEADY * np.abs(jumps)
@@ -120,16 +124,16 @@ def saturation_risks(linear: LinearEquations, ways: IndependentMotions) -> Itera
     noise = _ABOVE * float((np.abs(work(_NOISE)) / mass).max()) / _SLOW
     damped = slow > (_FAINT + noise) * mass
     parts = np.divide(np.abs(fast), slow, out=np.zeros_like(slow), where=damped).max(axis=0)
-    for k, name in enumerate(ways.names):
+    for k, name in enumerate(motions.names):
         least = _CREEP * float(mass[k])
         if jump[k] > least:
-            yield _jump_risk(name, ways.units[k], float(jump[k]), least)
+            yield _jump_risk(name, motions.units[k], float(jump[k]), least)
         elif damped[:, k].any() and parts[k] < _SATURATED:
-            yield _saturated_risk(name, ways, k, float(parts[k]))
+            yield _saturated_risk(name, motions, k, float(parts[k]))
 
 
 def _work(
-    linear: LinearEquations, ways: IndependentMotions, signs: Array
+    linear: LinearEquations, motions: IndependentMotions, signs: Array
 ) -> Callable[[float], Array]:
     """Function of a speed that returns differences (k, n) of efforts along the coordinates.
 
@@ -143,18 +147,18 @@ def _work(
         return tree.inverse_dynamics(state.t, state.q, u, a, memory)
 
     def effort_difference(speed: float, row: Array) -> Array:
-        step = ways.to_speeds(row * ways.sizes)
+        step = motions.to_speeds(row * motions.sizes)
         if speed:
             step = speed * step
             return efforts(state.u + step, state.udot) - efforts(state.u - step, state.udot)
         return efforts(state.u, state.udot + step) - efforts(state.u, state.udot)
 
     def work(speed: float) -> Array:
-        found = (
-            np.array([ways.to_motion_efforts(effort_difference(speed, row)) for row in signs])
+        efforts = (
+            np.array([motions.to_motion_efforts(effort_difference(speed, row)) for row in signs])
             * signs
         )
-        return found if len(ways.sizes) > _SINGLE else found.diagonal()[None]
+        return efforts if len(motions.sizes) > _SINGLE else efforts.diagonal()[None]
 
     return work
 
@@ -170,13 +174,13 @@ def _jump_risk(name: str, unit: str, jump: float, least: float) -> Risk:
     )  # fmt: skip
 
 
-def _saturated_risk(name: str, ways: IndependentMotions, k: int, part: float) -> Risk:
+def _saturated_risk(name: str, motions: IndependentMotions, k: int, part: float) -> Risk:
     """Risk of damping that saturates above low speeds."""
     return Risk(
         "dry-friction", name,
         f"the damping of {name} is valid for speeds close to the state only: at "
-        f"{_FAST * ways.sizes[k]:.3g} {ways.units[k]}/s it is {part:.2g} times as large, as with "
-        "dry friction",
+        f"{_FAST * motions.sizes[k]:.3g} {motions.units[k]}/s it is {part:.2g} times as large, as "
+        "with dry friction",
         "give it as law.friction of the hinge, or as a linear damping", part, _SATURATED,
     )  # fmt: skip
 
@@ -200,21 +204,21 @@ def _sticking_amplitudes(linear: LinearEquations, left: list[StickingFriction]) 
 
     All other coordinates follow.  It is infinite without stiffness.
     """
-    ways = np.zeros((len(left), len(linear)))
+    motions = np.zeros((len(left), len(linear)))
     if not linear.has_stiffness:
         return np.full(len(left), np.inf)
     if linear.constrained_motion is not None:
-        ways = linear.constrained_motion.motion_basis[[one.speed for one in left]]
+        motions = linear.constrained_motion.motion_basis[[friction.speed for friction in left]]
     else:
-        places = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
-        for row, one in zip(ways, left, strict=True):
-            row[places[one.speed]] = 1.0
+        row_by_speed = {speed: k for k, speed in enumerate(linear.free_speed_indices)}
+        for row, friction in zip(motions, left, strict=True):
+            row[row_by_speed[friction.speed]] = 1.0
     sizes = speed_scales(linear.model)[list(linear.free_speed_indices)]
-    stiffness, rows = linear.K * np.outer(sizes, sizes), ways * sizes
+    stiffness, rows = linear.K * np.outer(sizes, sizes), motions * sizes
     moved = lstsq(stiffness, rows.T, cond=_SOFT, lapack_driver="gelsy")[0]
     missing = np.abs(stiffness @ moved - rows.T).max(axis=0, initial=0.0)
     held = missing <= 1e-6 * np.abs(rows).max(axis=1, initial=0.0)
     flexibility = np.abs(np.einsum("kn,nk->k", rows, moved))
-    found = np.array([one.static for one in left]) * flexibility
-    far = _FAR * speed_scales(linear.model)[[one.speed for one in left]]
-    return np.where(held & (found > 0) & (found < far), found, np.inf)
+    amplitudes = np.array([friction.static for friction in left]) * flexibility
+    far = _FAR * speed_scales(linear.model)[[friction.speed for friction in left]]
+    return np.where(held & (amplitudes > 0) & (amplitudes < far), amplitudes, np.inf)

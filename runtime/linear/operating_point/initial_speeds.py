@@ -64,8 +64,8 @@ def _persistent_speeds(linear: LinearEquations, speeds: Array) -> Array:
     """Part of the speeds (n,) that no stiffness or damping changes within a revolution."""
     scale = np.sqrt(linear.M.diagonal())
     fastest, stiffness = _fastest(linear, speeds), linear.K / np.outer(scale, scale)
-    _, squares, ways = np.linalg.svd(stiffness)
-    kept = ways[squares < _WEAK * fastest**2]
+    _, squares, motions = np.linalg.svd(stiffness)
+    kept = motions[squares < _WEAK * fastest**2]
     lasting = np.asarray(kept.T @ (kept @ (scale * speeds)) / scale)
     slowed, energy = lasting @ linear.C @ lasting, lasting @ linear.M @ lasting
     return lasting if slowed < _SLOW * fastest * energy else np.zeros_like(lasting)

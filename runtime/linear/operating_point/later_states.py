@@ -53,7 +53,7 @@ class LaterStates:
     def __init__(self, linear: LinearEquations) -> None:
         self._linear, system = linear, linear.model.packed_scene.system
         state, first = linear.state, system.first_indices["u"]
-        drives = [int(first[place]) + k for place, k in system.driven]
+        drives = [int(first[tree_index]) + k for tree_index, k in system.driven]
         self.driven = [k for k in drives if state.u[k] or state.udot[k]]
         turning = [*self._states_at(self._phases())]
         timed = (
@@ -62,10 +62,10 @@ class LaterStates:
             else [*self._states_at([*_TIMES, *self._times_between_breaks()])]
         )
         uniform = not self.driven or all(
-            np.allclose(one.u[drives], state.u[drives], rtol=1e-12)
-            and not one.udot[drives].any() for one in timed
+            np.allclose(later_state.u[drives], state.u[drives], rtol=1e-12)
+            and not later_state.udot[drives].any() for later_state in timed
         )  # fmt: skip
-        fixed = not self.driven and all(not one.u[drives].any() for one in timed)
+        fixed = not self.driven and all(not later_state.u[drives].any() for later_state in timed)
         depends = system.has_timed_loads or system.has_loops or not (uniform or fixed)
         self.all_states = [*turning, *timed]
         self.compared_states = [*turning, *(timed[::_SPARSE] if depends else ())]
@@ -98,11 +98,11 @@ class LaterStates:
     def _times_between_breaks(self) -> list[float]:
         """Times (s) after the state, midway between breaks of expressions and inputs."""
         scene, t = self._linear.model.scene, self._linear.state.t
-        inputs, found = scene.channels, set[float]()
-        for one in active_expressions(scene):
-            found.update(one.expression.time_breaks())
-            found.update(knot for name in one.inputs for knot in inputs[name].knots)
-        ahead = sorted(x - t for x in found if x > t)
+        inputs, breaks = scene.channels, set[float]()
+        for active in active_expressions(scene):
+            breaks.update(active.expression.time_breaks())
+            breaks.update(knot for name in active.inputs for knot in inputs[name].knots)
+        ahead = sorted(x - t for x in breaks if x > t)
         ahead = ahead[:: max(1, len(ahead) // _BREAKS)]
         ends = [0.0, *ahead, *([2 * ahead[-1]] if ahead else [])]
         return [(a + b) / 2 for a, b in pairwise(ends)]
@@ -166,7 +166,7 @@ def _move_state(
     whole = SceneSystem(engine).start(t, q, u)
     q, u = whole[: model.nq], whole[model.nq : model.nq + model.nu]
     if loops is not None and model.independent_speeds is not None:
-        places = list(loops.independent_indices)
-        ways = model.independent_speeds.motion_matrix(q, places)
-        u = u + ways @ (linear.state.u[places] - u[places])
+        speed_indices = list(loops.independent_indices)
+        motions = model.independent_speeds.motion_matrix(q, speed_indices)
+        u = u + motions @ (linear.state.u[speed_indices] - u[speed_indices])
     return q, u

@@ -39,9 +39,15 @@ def outputs_of(linear: LinearEquations, names: Sequence[str] | None) -> list[Lin
     """
     shown = _Outputs(linear)
     if names is not None:
-        return [one for name in require_names("outputs", names) for one in shown.find_by_name(name)]
+        return [
+            quantity
+            for name in require_names("outputs", names)
+            for quantity in shown.find_by_name(name)
+        ]
     of_scene = [
-        one for output in linear.model.scene.output for one in shown.available_quantities(output)
+        quantity
+        for output in linear.model.scene.output
+        for quantity in shown.available_quantities(output)
     ]
     return of_scene or [shown.lookup.get(name) for name in linear.coordinate_names]
 
@@ -49,21 +55,23 @@ def outputs_of(linear: LinearEquations, names: Sequence[str] | None) -> list[Lin
 def read_by(linear: LinearEquations, names: Sequence[str] | None) -> list[str]:
     """Names of quantities that outputs and their expressions read; None: outputs of the scene."""
     scene = {output.name: output.of.names for output in linear.model.scene.output}
-    found = list[str]()
+    names_read = list[str]()
     for name in scene if names is None else require_names("outputs", names):
-        found += [one.text for one in scene[name]] if name in scene else [name]
-    return found
+        names_read += (
+            [expression_name.text for expression_name in scene[name]] if name in scene else [name]
+        )
+    return names_read
 
 
 def unavailable_outputs(linear: LinearEquations) -> list[tuple[str, str]]:
     """Outputs (name, reason) of the scene that are not available in the linear model."""
-    shown, found = _Outputs(linear), []
+    shown, unavailable = _Outputs(linear), []
     for output in linear.model.scene.output:
         try:
             shown.scene_output_quantities(output)
         except SceneError as error:
-            found.append((output.name, str(error)))
-    return found
+            unavailable.append((output.name, str(error)))
+    return unavailable
 
 
 class _Outputs:
@@ -98,20 +106,22 @@ class _Outputs:
         try:
             if not source:
                 return [formula(output.of, output.name, output.unit, self.lookup.read)]
-            found = self.lookup.find(source)
-            if found is not None:
-                return [_rename_quantity(found, output, "")]
+            quantity = self.lookup.find(source)
+            if quantity is not None:
+                return [_rename_quantity(quantity, output, "")]
             axes = [(axis, self.lookup.find(f"{source}.{axis}")) for axis in _AXES]
             some = [
-                _rename_quantity(one, output, f".{axis}") for axis, one in axes if one is not None
+                _rename_quantity(quantity, output, f".{axis}")
+                for axis, quantity in axes
+                if quantity is not None
             ]
             return some or [self.lookup.get(source)]
         except SceneError as error:
             raise SceneError(f'output "{output.name}": of: {error}') from None
 
 
-def _rename_quantity(found: LinearQuantity, output: Output, component: str) -> LinearQuantity:
-    return replace(found, name=f"{output.name}{component}", unit=output.unit or found.unit)
+def _rename_quantity(quantity: LinearQuantity, output: Output, component: str) -> LinearQuantity:
+    return replace(quantity, name=f"{output.name}{component}", unit=output.unit or quantity.unit)
 
 
 @dataclass(frozen=True)
@@ -131,25 +141,25 @@ def rows_of(
 ) -> Rows:
     """Rows of outputs for some inputs."""
     nu, shape = linear.model.nu, (len(outputs), linear.model.nu)
-    parts = [(k, part) for k, one in enumerate(outputs) for part in one.parts]
+    parts = [(k, part) for k, quantity in enumerate(outputs) for part in quantity.parts]
     orders = {part.order: np.zeros(shape) for _, part in parts}
     reach = [part.channel for _, part in parts if part.channel is not None]
-    distinct = {one: k for k, one in enumerate(dict.fromkeys(reach))}
+    distinct = {reached: k for k, reached in enumerate(dict.fromkeys(reach))}
     reached = columns(linear.open_tree, linear.state, list(distinct), list(range(nu)))
     for k, part in parts:
         row = orders[part.order][k]
         if part.channel is not None:
             row += part.factor * reached[:, distinct[part.channel]]
-        for place, number in part.speeds:
-            row[place] += part.factor * number
+        for index, number in part.speeds:
+            row[index] += part.factor * number
     through = np.zeros((len(outputs), len(pushes)))
-    places = {one.name: j for j, one in enumerate(pushes)}
-    for k, one in enumerate(outputs):
-        for name, slope in one.feedthrough:
-            if name in places:
-                through[k, places[name]] += slope
+    column_by_input = {channel.name: j for j, channel in enumerate(pushes)}
+    for k, quantity in enumerate(outputs):
+        for name, slope in quantity.feedthrough:
+            if name in column_by_input:
+                through[k, column_by_input[name]] += slope
     if linear.constrained_motion is not None:
-        drives = {speed for one in pushes for speed, _ in one.drive_factors} | {
+        drives = {speed for channel in pushes for speed, _ in channel.drive_factors} | {
             *linear.drive_indices
         }
         orders = linear.constrained_motion.rows(linear.state, orders, drives)
@@ -163,12 +173,12 @@ def _with_rate_matrix(linear: LinearEquations, orders: dict[int, Array]) -> dict
     """Rows of x from rows of speeds, where x' = G x + du: du = x' - G x, da = x'' - G x'."""
     if linear.rate_matrix is None:
         return orders
-    free, found = (
+    free, rows_found = (
         list(linear.free_speed_indices),
         {order: rows.copy() for order, rows in orders.items()},
     )
     for order, rows in orders.items():
         if order:
-            lower = found.setdefault(order - 1, np.zeros_like(rows))
+            lower = rows_found.setdefault(order - 1, np.zeros_like(rows))
             lower[:, free] -= rows[:, free] @ linear.rate_matrix
-    return found
+    return rows_found

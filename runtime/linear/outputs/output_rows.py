@@ -48,17 +48,17 @@ def formula(
 
     Raises SceneError where the expression is not differentiable there.
     """
-    seen = {one: read(one) for one in of.names}
-    numbers = {one: quantity.value() for one, quantity in seen.items()}
+    seen = {name: read(name) for name in of.names}
+    numbers = {name: quantity.value() for name, quantity in seen.items()}
     parts, through = list[Part](), list[tuple[str, float]]()
-    for one, slope in expression_derivatives(of, numbers.__getitem__).items():
+    for variable, slope in expression_derivatives(of, numbers.__getitem__).items():
         if not math.isfinite(slope):
             raise SceneError(
-                f'"{of.text}" has no finite derivative with respect to {one.text} at this state, '
-                f"{one.text} = {numbers[one]:.6g}"
+                f'"{of.text}" has no finite derivative with respect to {variable.text} at this '
+                f"state, {variable.text} = {numbers[variable]:.6g}"
             )
-        parts += scale_parts(seen[one].parts, slope)
-        through += [(given, slope * x) for given, x in seen[one].feedthrough]
+        parts += scale_parts(seen[variable].parts, slope)
+        through += [(given, slope * x) for given, x in seen[variable].feedthrough]
     value = of.evaluate(numbers.__getitem__)
     return LinearQuantity(name, unit, tuple(parts), lambda: value, tuple(through))
 

@@ -49,7 +49,7 @@ class QuantityLookup:
         self._linear, self._state = linear, linear.state
         self._model, self._layout = linear.model, linear.model.coordinate_layout
         self._ends = BodyReferences(linear.model.scene.skeleton)
-        self._springs = {one.name: k for k, one in enumerate(linear.model.scene.spring)}
+        self._springs = {spring.name: k for k, spring in enumerate(linear.model.scene.spring)}
 
     def read(self, name: Name) -> LinearQuantity:
         """Quantity of a name in an expression; the time t is constant."""
@@ -62,17 +62,17 @@ class QuantityLookup:
 
         Raises SceneError with the closest known name if linear models have no such quantity.
         """
-        found = self.find(name)
-        if found is None:
+        quantity = self.find(name)
+        if quantity is None:
             coordinates = self._linear.coordinate_names or ("shoulder.angle",)
-            outputs = (one.name for one in self._model.scene.output)
+            outputs = (output.name for output in self._model.scene.output)
             raise SceneError(
                 f'"{name}": expected a coordinate such as "{coordinates[0]}", its rate, a motion '
                 'of a body or end such as "boom.tip.position.x" or "boom.tip.vx", a quantity '
                 "of a spring, or an output of the scene"
                 f"{did_you_mean(name, (*outputs, *self.known_names()))}"
             )
-        return found
+        return quantity
 
     def find(self, name: str) -> LinearQuantity | None:
         """Quantity of a name; None if linear models have no such quantity.
@@ -83,9 +83,9 @@ class QuantityLookup:
         if name in self._model.scene.channels:
             return self._input(name)
         if owner in self._layout.hinges:
-            found = self._hinge_quantity(self._layout.hinges[owner], last)
-            if found is not None:
-                return found
+            quantity = self._hinge_quantity(self._layout.hinges[owner], last)
+            if quantity is not None:
+                return quantity
         if owner in self._springs and last in SPRING_QUANTITIES:
             return self._spring_quantity(self._springs[owner], last)
         return self._end_quantity(name, owner, last)
@@ -106,8 +106,8 @@ class QuantityLookup:
 
     def _input(self, name: str) -> LinearQuantity:
         scene, t = self._model.scene, self._state.t
-        inputs = {one.name: one.unit for one in scene.input}
-        unit = (inputs | {one.name: one.unit for one in scene.signal})[name]
+        inputs = {scene_input.name: scene_input.unit for scene_input in scene.input}
+        unit = (inputs | {signal.name: signal.unit for signal in scene.signal})[name]
         through = ((name, 1.0),) if name in inputs else ()
         return LinearQuantity(name, unit, (), lambda: scene.channels[name].value(t), through)
 
@@ -117,18 +117,20 @@ class QuantityLookup:
         """Coordinate, rate or acceleration of a hinge, by name or index; None if unknown."""
         state = self._state
         for k, speed in enumerate(slots.u_names):
-            row, place = ((slots.u + k, 1.0),), slots.u + k
+            row, speed_index = ((slots.u + k, 1.0),), slots.u + k
             if last == f"{speed}_increment" and not slots.rates_are_speeds:
                 unit = slots.u_units[k].removesuffix("/s")
                 return LinearQuantity(f"{slots.name}.{last}", unit, (Part(0, row),), lambda: 0.0)
             if last in _aliases(speed, "u", k, slots.nu):
                 unit, parts = slots.u_units[k], (Part(1, row),)
-                return LinearQuantity(f"{slots.name}.{speed}", unit, parts, _entry(state.u, place))
+                return LinearQuantity(
+                    f"{slots.name}.{speed}", unit, parts, _entry(state.u, speed_index)
+                )
             rate = acceleration_name(speed)
             if last in _aliases(rate, "udot", k, slots.nu):
                 unit, parts = rate_unit(slots.u_units[k]), (Part(2, row),)
                 return LinearQuantity(
-                    f"{slots.name}.{rate}", unit, parts, _entry(state.udot, place)
+                    f"{slots.name}.{rate}", unit, parts, _entry(state.udot, speed_index)
                 )
         for k, (name, unit) in enumerate(zip(slots.q_names, slots.q_units, strict=True)):
             if last in _aliases(name, "q", k, slots.nq):
@@ -143,12 +145,12 @@ class QuantityLookup:
         if slots.rates_are_speeds:
             return ((slots.u + k, 1.0),)
         engine, state = self._model.looped, self._state
-        found = []
-        for place in range(slots.u, slots.u + slots.nu):
-            unit = np.eye(1, engine.nu, place)[0]
+        following = []
+        for speed_index in range(slots.u, slots.u + slots.nu):
+            unit = np.eye(1, engine.nu, speed_index)[0]
             rates = engine.rates(state.t, state.q, unit, engine.start_memory())
-            found.append((place, float(rates[slots.q + k])))
-        return tuple(found)
+            following.append((speed_index, float(rates[slots.q + k])))
+        return tuple(following)
 
     # --- ends -------------------------------------------------------------------------------------
 
@@ -173,11 +175,11 @@ class QuantityLookup:
     def _points(self, ends: Sequence[tuple[int, tuple[float, ...], tuple[float, ...]]]) -> Array:
         """Motion (ends, 24) at the operating point; columns of `Observation.points`."""
         engine, state = self._model.looped, self._state
-        found = engine.observe(
+        observations = engine.observe(
             np.array([state.t]), state.q[None], state.u[None], engine.start_memory()[None],
             [Probe(*end) for end in ends], parts=("points",),
         )  # fmt: skip
-        return found.points[0]
+        return observations.points[0]
 
     def _check_at_rest(self, name: str, order: int) -> None:
         if order and self._state.u.any():
@@ -217,14 +219,15 @@ class QuantityLookup:
         """Effort of a spring: stiffness, damping and its effort expression."""
         length, rate = (self._spring_quantity(number, kind) for kind in ("length", "length_rate"))
 
-        def read(one: Name) -> LinearQuantity:
-            if not one.hinge and one.quantity in ("q", "u"):
-                return length if one.quantity == "q" else rate
-            return self.read(one)
+        def read(expression_name: Name) -> LinearQuantity:
+            if not expression_name.hinge and expression_name.quantity in ("q", "u"):
+                return length if expression_name.quantity == "q" else rate
+            return self.read(expression_name)
 
         given = formula(law.effort, name, SPRING_QUANTITIES["effort"].unit, read)
         springs, damps = (
-            scale_parts(one.parts, -x) for one, x in ((length, law.stiffness), (rate, law.damping))
+            scale_parts(quantity.parts, -x)
+            for quantity, x in ((length, law.stiffness), (rate, law.damping))
         )
 
         def value() -> float:
@@ -239,5 +242,5 @@ def _aliases(name: str, short: str, k: int, count: int) -> tuple[str, ...]:
     return (name, f"{short}[{k}]", short) if count == 1 else (name, f"{short}[{k}]")
 
 
-def _entry(values: Array, place: int) -> Callable[[], float]:
-    return lambda: float(values[place])
+def _entry(values: Array, index: int) -> Callable[[], float]:
+    return lambda: float(values[index])

@@ -62,10 +62,10 @@ def view(
 def _amplitude(linear: LinearEquations, shape: Array, part: float) -> float:
     """Factor of a shape for visible displacements and limited rotations."""
     both = np.stack([np.real(shape), np.imag(shape)], axis=1)
-    found = amplitudes(linear, both, part)
+    largest = amplitudes(linear, both, part)
     turns = np.array([unit == "rad" for unit in linear.coordinate_units])
     most = np.abs(shape[turns]).max(initial=0.0)
-    usual = float(found[found > 0].min(initial=np.inf))
+    usual = float(largest[largest > 0].min(initial=np.inf))
     if not np.isfinite(usual):
         return _TURNS / most if most > 0 else 0.0
     return min(usual, _MOST / most) if most > 0 else usual
@@ -86,7 +86,7 @@ def _static_result(linear: LinearEquations, q: Array) -> Result:
     """Result of coordinates q (f, nq) as frames without speed, at the time of the state."""
     model, count, t = linear.model, len(q), linear.state.t
     memory = np.tile(model.looped.start_memory(), (count, 1))
-    none: dict[str, Any] = {one.name: 0 for one in fields(Statistics)}
+    none: dict[str, Any] = {field.name: 0 for field in fields(Statistics)}
     return Result(model, Trajectory(
         np.full(count, t), q, np.zeros((count, model.nu)), memory, np.zeros(count),
         np.zeros(count, dtype=np.int64), Status.FINISHED, "", Settings(t, t), Statistics(**none),
@@ -104,8 +104,8 @@ def _reference_bodies(linear: LinearEquations) -> Solid:
 
 
 def _surfaces(stage: SceneGraph) -> list[Surface]:
-    found = [Surface(bent.vertices[0], bent.faces) for bent in stage.deforming_surfaces]
+    surfaces = [Surface(bent.vertices[0], bent.faces) for bent in stage.deforming_surfaces]
     for solid in stage.solids:
         if solid.owner.startswith("bodies/") and not solid.hidden:
-            found.append(solid.surface.with_pose(*stage.poses[solid.owner].pose_at(0)))
-    return found
+            surfaces.append(solid.surface.with_pose(*stage.poses[solid.owner].pose_at(0)))
+    return surfaces

@@ -44,16 +44,16 @@ def shapes(
     require_columns(shapes)
     columns = min(3, len(which)) if len(which) != 4 else 2
     rows = -(-len(which) // columns)
-    made = figure(2.6 * rows + 0.3, 3.4 * columns if columns > 1 else 5.0)
-    panels = made.subplots(rows, columns, squeeze=False).ravel()
+    drawing = figure(2.6 * rows + 0.3, 3.4 * columns if columns > 1 else 5.0)
+    panels = drawing.subplots(rows, columns, squeeze=False).ravel()
     rest, moved = deformed_outlines(linear, np.real(shapes[:, list(which)]), _PART)
-    for panel, k, one in zip(panels, which, moved, strict=False):
-        _panel(panel, rest, one)
+    for panel, k, outline in zip(panels, which, moved, strict=False):
+        _panel(panel, rest, outline)
         panel.set_title(f"{k + 1}: {eigenvalue_text(complex(eigenvalues[k]))}", fontsize=9)
     for panel in panels[len(which) :]:
         panel.set_visible(False)
-    write(made, path)
-    return made
+    write(drawing, path)
+    return drawing
 
 
 def eigenvalue_text(value: complex) -> str:
@@ -115,8 +115,8 @@ def _plane(rest: Array, moved: Array) -> tuple[int, int]:
     moves = np.abs(moved - rest).max(axis=0)
     reach = np.ptp(rest, axis=0)
     first = int(np.argmax(moves)) if moves.any() else int(np.argmax(reach))
-    others = [k for k in range(3) if k != first]
-    second = max(others, key=lambda k: (round(reach[k], 12), moves[k]))
+    other_axes = [k for k in range(3) if k != first]
+    second = max(other_axes, key=lambda k: (round(reach[k], 12), moves[k]))
     low, high = sorted((first, second))
     return low, high
 
@@ -124,16 +124,16 @@ def _plane(rest: Array, moved: Array) -> tuple[int, int]:
 def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     """Plot eigenvalues in the complex plane; unstable ones are red."""
     require_columns(values[None])
-    made = figure(5.0)
-    axis = made.subplots()
+    drawing = figure(5.0)
+    axis = drawing.subplots()
     growing = values.real > 0
     for some, colour in ((~growing, _BLUE), (growing, _RED)):
         axis.plot(values[some].real, values[some].imag, "x", color=colour, ms=7, mew=1.6)
     wide = _spread(values.imag) > _SPREAD
     (_use_log_axes if wide else _widen_limits)(axis, values.real, values.imag)
     for k in _separate_indices(axis, values[:_NUMBERED]):
-        place = values[k].real, values[k].imag
-        axis.annotate(str(k + 1), place, xytext=(6, 3), fontsize=8, textcoords="offset points",
+        position = values[k].real, values[k].imag
+        axis.annotate(str(k + 1), position, xytext=(6, 3), fontsize=8, textcoords="offset points",
                       color="0.35")  # fmt: skip
     if (values.real < 0).any():
         _rays(axis, _decade_below(values.imag[values.imag > 0]) if wide else 0.0)
@@ -141,8 +141,8 @@ def eigenvalues(values: Complex, path: str | Path | None) -> Any:
     axis.set_xlabel("growth in 1/s")
     axis.set_ylabel("angular frequency in rad/s")
     finish_axes(axis)
-    write(made, path)
-    return made
+    write(drawing, path)
+    return drawing
 
 
 def _spread(imaginary: Array) -> float:
@@ -176,12 +176,12 @@ def _widen_limits(axis: Any, real: Array, imaginary: Array) -> None:
 
 def _separate_indices(axis: Any, values: Complex) -> list[int]:
     """Indices of eigenvalues that do not overlap an earlier one in the plot."""
-    places = (axis.transScale + axis.transLimits).transform(
+    positions = (axis.transScale + axis.transLimits).transform(
         np.column_stack([values.real, values.imag])
     )
     kept: list[int] = []
-    for k, place in enumerate(places):
-        if all(np.abs(place - places[j]).max() > _CLOSE for j in kept):
+    for k, position in enumerate(positions):
+        if all(np.abs(position - positions[j]).max() > _CLOSE for j in kept):
             kept.append(k)
     return kept
 

@@ -47,18 +47,20 @@ class Outline:
         """Points (n, 3) of all lines, joints and ground hinges, m."""
         return np.concatenate([*self.bodies, *self.springs, self.joints, self.ground])
 
-    def displace(self, other: Outline, scale: float) -> Outline:
+    def displace(self, outline: Outline, scale: float) -> Outline:
         """Outline with every point moved by `scale` times its displacement to the other outline."""
 
-        def displace_points(one: Array, there: Array) -> Array:
-            return one + scale * (there - one)
+        def displace_points(points: Array, there: Array) -> Array:
+            return points + scale * (there - points)
 
         def displace_lines(lines: list[Array], there: list[Array]) -> list[Array]:
             return [displace_points(*pair) for pair in zip(lines, there, strict=True)]
 
         return Outline(
-            displace_lines(self.bodies, other.bodies), displace_lines(self.springs, other.springs),
-            displace_points(self.joints, other.joints), displace_points(self.ground, other.ground),
+            displace_lines(self.bodies, outline.bodies),
+            displace_lines(self.springs, outline.springs),
+            displace_points(self.joints, outline.joints),
+            displace_points(self.ground, outline.ground),
         )  # fmt: skip
 
 
@@ -70,7 +72,9 @@ def deformed_outlines(
     The largest displacement of a point is `part` times the size of the scene.
     """
     rest, near, scales = _small_displacements(linear, shapes, _steps(shapes), part)
-    return rest, [rest.displace(one, scale) for one, scale in zip(near, scales, strict=True)]
+    return rest, [
+        rest.displace(outline, scale) for outline, scale in zip(near, scales, strict=True)
+    ]
 
 
 def amplitudes(linear: LinearEquations, shapes: Array, part: float) -> Array:
@@ -96,7 +100,9 @@ def _small_displacements(
     states = [linear.state.q, *(linear.displaced_state(x) for x in (shapes * steps).T)]
     rest, *near = outlines(linear, np.array(states))
     size = float(np.linalg.norm(np.ptp(rest.points, axis=0)))
-    largest = [float(np.linalg.norm(one.points - rest.points, axis=1).max()) for one in near]
+    largest = [
+        float(np.linalg.norm(outline.points - rest.points, axis=1).max()) for outline in near
+    ]
     scales = [
         part * (size or 1.0) / far if far > _MIN_DISPLACEMENT * _STEP * size else 0.0
         for far in largest
@@ -140,7 +146,7 @@ class _SceneObservation:
 
     def _observe_references(self, references: Sequence[str]) -> Array:
         """Motion (references, n, 24) of bodies and ends; columns of `Observation.points`."""
-        return self._observe([Probe(*self.packed.end(one)) for one in references])
+        return self._observe([Probe(*self.packed.end(reference)) for reference in references])
 
     def _observe(self, probes: list[Probe]) -> Array:
         engine, q = self.model.looped.inertia_only, self.q
@@ -161,17 +167,17 @@ class _SceneObservation:
             if hinge.inboard != "ground":
                 yield self._line(hinge.inboard, hinge.outboard)
 
-    def _line(self, one: str, other: str) -> Array:
-        return np.stack([self.motions[one][:, 0:3], self.motions[other][:, 0:3]], axis=1)
+    def _line(self, first_end: str, second_end: str) -> Array:
+        return np.stack([self.motions[first_end][:, 0:3], self.motions[second_end][:, 0:3]], axis=1)
 
     def _star(self, name: str) -> Iterator[Array]:
         """Lines from the hinge of a body to its other ends, or without such to its mass centre."""
         held = self.outboard_references.get(name, name)
         ends = [f"{name}.{end}" for end in self.scene.bodies.ends(name) or ()]
-        others = [end for end in ends if end != held]
-        for end in others:
+        free_ends = [end for end in ends if end != held]
+        for end in free_ends:
             yield self._line(held, end)
-        if not others:
+        if not free_ends:
             pose = self.motions[name]
             body = self.scene.bodies.by_name[name]
             offset = pose[:, 15:24].reshape(-1, 3, 3) @ np.array(body.center_of_mass, float)
@@ -201,8 +207,8 @@ class _SceneObservation:
     def ground(self) -> Array:
         """Positions (k, 3) of hinges that constrain bodies to the ground."""
         slots = self.model.coordinate_layout.hinges
-        places = [
+        positions = [
             hinge.position for hinge in self.hinges
             if hinge.inboard == "ground" and slots[hinge.name].nu < _FREE
         ]  # fmt: skip
-        return np.array(places, float).reshape(-1, 3)
+        return np.array(positions, float).reshape(-1, 3)

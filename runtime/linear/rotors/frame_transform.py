@@ -26,26 +26,28 @@ class FrameTransform:
         """Transformation dt (s) later."""
         return FrameTransform(self.rotation @ expm(self.rates * dt), self.rates)
 
-    def matrices(self, found: Matrices) -> Matrices:
+    def matrices(self, given: Matrices) -> Matrices:
         """Matrices M, C, K of y from those of x."""
         back, w = np.linalg.inv(self.rotation), self.rates
-        m, c, k = (back.T @ one @ back for one in (found.M, found.C, found.K))
+        m, c, k = (back.T @ matrix @ back for matrix in (given.M, given.C, given.K))
         return Matrices(m, c - 2 * m @ w, k - c @ w + m @ w @ w)
 
     def input_matrix(self, columns: Array) -> Array:
         """Input columns (n, inputs) of y from those of x."""
         return np.asarray(np.linalg.solve(self.rotation.T, columns))
 
-    def rows(self, orders: dict[int, Array], places: list[int]) -> dict[int, Array]:
-        """Output rows of y (outputs, nu), by power of s, from those of x at indices `places`."""
-        back, found = np.linalg.inv(self.rotation), {k: wide.copy() for k, wide in orders.items()}
+    def rows(self, orders: dict[int, Array], column_indices: list[int]) -> dict[int, Array]:
+        """Output rows of y (outputs, nu), by power of s, from those of x at `column_indices`."""
+        back, rotated = np.linalg.inv(self.rotation), {k: wide.copy() for k, wide in orders.items()}
         for order in sorted(orders, reverse=True):
-            own = orders[order][:, places] @ back
-            found[order][:, places] += own - orders[order][:, places]
+            own = orders[order][:, column_indices] @ back
+            rotated[order][:, column_indices] += own - orders[order][:, column_indices]
             for lower, factor in _BELOW[order]:
-                rows = found.setdefault(lower, np.zeros_like(orders[order]))
-                rows[:, places] += factor * own @ np.linalg.matrix_power(self.rates, order - lower)
-        return found
+                rows = rotated.setdefault(lower, np.zeros_like(orders[order]))
+                rows[:, column_indices] += (
+                    factor * own @ np.linalg.matrix_power(self.rates, order - lower)
+                )
+        return rotated
 
 
 #: Lower-order terms of x^(order) = T^-1 (y^(order) + ...): (order of y, factor of a power of W).

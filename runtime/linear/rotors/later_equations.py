@@ -54,7 +54,7 @@ def ahead(linear: LinearEquations) -> State:
     return State(state.t + dt, q, u, a[0])
 
 
-def relative_difference(one: Array, other: Array) -> float:
+def relative_difference(first: Array, second: Array) -> float:
     """Largest difference relative to the largest entry of the first array."""
-    scale = float(np.abs(one).max(initial=0))
-    return float(np.abs(one - other).max(initial=0)) / scale if scale else 0.0
+    scale = float(np.abs(first).max(initial=0))
+    return float(np.abs(first - second).max(initial=0)) / scale if scale else 0.0

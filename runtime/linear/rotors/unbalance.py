@@ -130,12 +130,13 @@ def unbalance_response(
     """Unbalance response; see `Model.unbalance_response`."""
     size = finite_float("unbalance", unbalance, "m e in kg m")
     models = [linear_at(value).to_fixed_frame() for value in values.tolist()]
-    places = [_end(models[0], name) for name in (at, *points)]
+    end_names = [_end(models[0], name) for name in (at, *points)]
     axes = [angular_velocity(linear, at) for linear in models]
     spins = np.array([np.linalg.norm(axis) for axis in axes])
     across = _normal_vectors(axes[int(spins.argmax())])
     responses = [
-        _response(linear, spin, places) for linear, spin in zip(models, spins.tolist(), strict=True)
+        _response(linear, spin, end_names)
+        for linear, spin in zip(models, spins.tolist(), strict=True)
     ]
     whirls = [
         _whirl(response, spin, size * across, len(points))
@@ -147,10 +148,13 @@ def unbalance_response(
         if response is not None
     ]
     findings = DeferredRisks(
-        lambda: merge_over_values(parameter, [(value, one.risks) for value, one in assessed])
+        lambda: merge_over_values(
+            parameter, [(value, response.risks) for value, response in assessed]
+        )
     )
     return UnbalanceResponse(
-        parameter, values, spins, places[0], size, tuple(places[1:]), np.array(whirls), across,
+        parameter, values, spins, end_names[0], size, tuple(end_names[1:]), np.array(whirls),
+        across,
         findings,
     )  # fmt: skip
 
@@ -174,12 +178,12 @@ def _normal_vectors(axis: Array) -> Array:
     return np.array([first, np.cross(along, first)])
 
 
-def _response(linear: Linear, spin: float, places: Sequence[str]) -> FrequencyResponse | None:
+def _response(linear: Linear, spin: float, end_names: Sequence[str]) -> FrequencyResponse | None:
     """Response of the points to forces at the first place, at the spin; None without spin."""
     if not spin:
         return None
-    inputs = [f"{places[0]}.force.{axis}" for axis in "xyz"]
-    outputs = [f"{point}.position.{axis}" for point in places[1:] for axis in "xyz"]
+    inputs = [f"{end_names[0]}.force.{axis}" for axis in "xyz"]
+    outputs = [f"{point}.position.{axis}" for point in end_names[1:] for axis in "xyz"]
     return linear.frequency_response([spin], inputs, outputs)
 
 

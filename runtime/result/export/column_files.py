@@ -191,10 +191,10 @@ def read_mat(path: Path) -> ColumnFile:
 
 
 def _build_columns(
-    path: Path, t: Array, event: Array, found: Mapping[str, tuple[str, Array]]
+    path: Path, t: Array, event: Array, columns_found: Mapping[str, tuple[str, Array]]
 ) -> ColumnFile:
     """Columns of a file, if it can be that of a run."""
-    columns = [t, event, *(values for _, values in found.values())]
+    columns = [t, event, *(values for _, values in columns_found.values())]
     if any(len(column) != len(t) for column in columns):
         raise _file_error(path, "its columns are not equally long")
     if any(column.dtype.kind not in "buif" for column in columns):
@@ -203,7 +203,7 @@ def _build_columns(
         raise _file_error(path, "its times are not finite numbers, none before another")
     if not (np.isfinite(event) & (np.abs(event) < _MAX_EVENT) & (event == np.round(event))).all():
         raise _file_error(path, "its events are not whole numbers")
-    return ColumnFile(path, t, event.astype(np.int64), found)
+    return ColumnFile(path, t, event.astype(np.int64), columns_found)
 
 
 def _file_error(path: Path, why: str) -> SceneError:

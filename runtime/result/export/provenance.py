@@ -174,21 +174,21 @@ def _read_floats(data: Any, name: str) -> Array:
 def _require_number(value: Any) -> Any:
     """Require a number, a bool or None, and return it."""
     if value is not None and not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} stands where a number was")
+        raise TypeError(f"{value!r} found, expected a number")
     return value
 
 
-def _read_settings(found: dict[str, Any]) -> Settings:
+def _read_settings(stored: dict[str, Any]) -> Settings:
     """Settings from saved values; TypeError for values of the wrong type."""
-    for name, value in found.items():
+    for name, value in stored.items():
         if name not in ("method", "output_times", "scheme", "tangent"):
             _require_number(value)
-    method = found["method"]
+    method = stored["method"]
     if method not in (AUTO, *external_integrators.METHODS, *classical_run.METHODS):
         get(method)
     if method in classical_run.METHODS:
-        parse_scheme(found.get("scheme", ""))
-    return Settings(**found)
+        parse_scheme(stored.get("scheme", ""))
+    return Settings(**stored)
 
 
 def read_trajectory(data: Any) -> Trajectory:

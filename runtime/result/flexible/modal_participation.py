@@ -83,11 +83,11 @@ def _loop_participation(
 
 
 def _participation_row(
-    name: str, inertia: Array, own: list[int], modes: list[int], others: list[int]
+    name: str, inertia: Array, own: list[int], modes: list[int], other_modes: list[int]
 ) -> dict[str, Array]:
     """Participation of one body; empty (unknown) where a hinge has no inertia."""
     try:
-        return {name: _participation_of_modes(inertia, own, modes, others)}
+        return {name: _participation_of_modes(inertia, own, modes, other_modes)}
     except np.linalg.LinAlgError:
         return {}
 
@@ -97,19 +97,19 @@ def _modal_speed_indices(model: CompiledScene, name: str) -> list[int]:
 
 
 def _participation_of_modes(
-    inertia: Array, own: list[int], modes: list[int], others: list[int]
+    inertia: Array, own: list[int], modes: list[int], other_modes: list[int]
 ) -> Array:
     """Participation chi of modes from the mass matrix.
 
-    `own`, `modes` and `others` are speed indices of the hinge, the modes and the outboard hinges.
+    `own`, `modes` and `other_modes` are speed indices of hinge, modes and outboard hinges.
     """
     indices, hinge_count = [*own, *modes], len(own)
     block = inertia[np.ix_(indices, indices)]
-    if others:
+    if other_modes:
         coupling_gain = np.linalg.solve(
-            inertia[np.ix_(others, others)], inertia[np.ix_(others, indices)]
+            inertia[np.ix_(other_modes, other_modes)], inertia[np.ix_(other_modes, indices)]
         )
-        block = block - inertia[np.ix_(indices, others)] @ coupling_gain
+        block = block - inertia[np.ix_(indices, other_modes)] @ coupling_gain
     return participation(
         block[:hinge_count, hinge_count:],
         block[:hinge_count, :hinge_count],
@@ -117,8 +117,8 @@ def _participation_of_modes(
     )
 
 
-def _bounds(places: slice) -> tuple[int, int]:
-    return int(places.start), int(places.stop)
+def _bounds(indices: slice) -> tuple[int, int]:
+    return int(indices.start), int(indices.stop)
 
 
 def participation(rows: Array, hinge: Array, modal: Array) -> Array:

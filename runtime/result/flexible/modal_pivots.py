@@ -31,11 +31,11 @@ class ModalPivots:
         self._subspace = lib.MSTMM_SECTION_H_PER_MODE
         self.frames: dict[int, tuple[int, int, int | None]] = {}
         modal, sections = packed.written.modal, packed.written.sections
-        for i, place in modal.items():
+        for i, index in modal.items():
             body = packed.system.body(i)
             assert body.modal is not None
-            self.frames[i] = (body.modal.n, place, sections.get(i))
-        self.sections = {i: place for i, place in sections.items() if i not in modal}
+            self.frames[i] = (body.modal.n, index, sections.get(i))
+        self.sections = {i: index for i, index in sections.items() if i not in modal}
 
     def add_modal_response(
         self, numbers: Array, S: Array, carried: Array, parents: NDArray[np.int64], E: Array

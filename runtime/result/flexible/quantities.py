@@ -54,8 +54,8 @@ class FlexibleResults:
         motion = self._flexible.motion(body, what)
         if isinstance(x, str):
             x = self._end_position(motion, x, what)
-        places = observe.checked_stations(motion.body, x, what)
-        values = get(motion, places)
+        positions = observe.checked_stations(motion.body, x, what)
+        values = get(motion, positions)
         return values[:, 0] if np.ndim(x) == 0 else values
 
     @staticmethod
@@ -123,16 +123,16 @@ class FlexibleResults:
             return self.section_force(body, x)[..., 0]
         return self._evaluate_along(body, x, "axial_force", observe.elastic_force)
 
-    def _loads(self, motion: Motion, places: Array) -> tuple[Array, Array]:
+    def _loads(self, motion: Motion, positions: Array) -> tuple[Array, Array]:
         flexible, name = self._flexible, motion.body.name
         if name in flexible.unbalanced:
             raise SceneError(
-                f'"{name}": loads of a loop on its ends are those of the rigid run, which do not '
-                "balance its vibration, so that no equilibrium tells loads of its sections; take "
+                f'"{name}": loop loads on its ends are those of the rigid run, which do not '
+                "balance its vibration, so that section loads do not follow from equilibrium; use "
                 'source = "shapes" of bending_moment and axial_force, or model = "flexible"'
             )
         return section_loads(
-            motion, places, flexible.gravity, flexible.inboard_position(name),
+            motion, positions, flexible.gravity, flexible.inboard_position(name),
             flexible.point_loads(name), flexible.line_loads(name),
         )  # fmt: skip
 

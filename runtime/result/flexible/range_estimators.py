@@ -50,8 +50,8 @@ def _rotation_vectors(motion: Motion) -> list[Array]:
     """Rotation vectors (n, m, 3) of sections along a beam, or of the ends of an elastic body."""
     body = motion.body
     if body.shapes is not None:
-        places = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
-        return [rotation_vectors(motion, places)]
+        positions = np.linspace(0.0, body.shapes.length, SECTION_COUNT)
+        return [rotation_vectors(motion, positions)]
     return [np.einsum("ak,tk->ta", p.theta, motion.eta)[:, None] for p in body.ports.values()]
 
 

@@ -44,7 +44,9 @@ class DefaultPanel:
     @property
     def sentence(self) -> str:
         """Note on what is left out, and how to get it; "" if nothing."""
-        return f"{self.more}: name what else you want, such as {self.other}" if self.more else ""
+        return (
+            f"{self.more}: give other quantities by name, such as {self.other}" if self.more else ""
+        )
 
 
 def rate_candidates(shown: QuantitySource, names: Iterable[str]) -> Iterator[Candidate]:

@@ -46,9 +46,9 @@ def _with_prefix(parts: Iterator[tuple[str, Mapping[str, T]]]) -> Iterator[tuple
             yield f"{name}/{owner}", value
 
 
-def _solid_with_prefix(name: str, one: Solid) -> Solid:
-    return replace(one, owner=f"{name}/{one.owner}")
+def _solid_with_prefix(name: str, solid: Solid) -> Solid:
+    return replace(solid, owner=f"{name}/{solid.owner}")
 
 
-def _named_with_prefix(name: str, one: NamedObject) -> NamedObject:
-    return replace(one, name=f"{name}/{one.name}")
+def _named_with_prefix(name: str, named_object: NamedObject) -> NamedObject:
+    return replace(named_object, name=f"{name}/{named_object.name}")

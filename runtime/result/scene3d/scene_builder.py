@@ -89,11 +89,11 @@ class _SceneBuilder:
         gravity_objects = gravity_arrow(scene_graph, float(np.linalg.norm(self.scene.gravity)))
         if gravity_objects is None:
             return scene_graph
-        arrow, told = gravity_objects
+        arrow, label = gravity_objects
         return replace(
             scene_graph,
             solids=(*scene_graph.solids, arrow),
-            labels={**scene_graph.labels, arrow.owner: told},
+            labels={**scene_graph.labels, arrow.owner: label},
         )
 
     # --- geometry ---------------------------------------------------------------------------------
@@ -248,8 +248,8 @@ class _SceneBuilder:
                 raise SceneError(
                     f'trail of "{reference}": the ground does not move; give an end of a body'
                 )
-            way = self.frame_times.path(self.run, reference)
-            yield Line(f"trails/{reference}", way[None], _TRAIL_COLOUR, 2.0)
+            path = self.frame_times.path(self.run, reference)
+            yield Line(f"trails/{reference}", path[None], _TRAIL_COLOUR, 2.0)
 
     def _centre(self, name: str, body: Body) -> Array:
         """Label position of a body, in its axes."""

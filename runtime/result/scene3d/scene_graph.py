@@ -131,7 +131,7 @@ class SceneGraph:
             replace(item, vertices=factor * item.vertices) for item in self.deforming_surfaces
         )
         lines = tuple(replace(item, points=factor * item.points) for item in self.lines)
-        told = {
+        labels = {
             owner: replace(item, anchor=factor * item.anchor) for owner, item in self.labels.items()
         }
         return replace(
@@ -140,7 +140,7 @@ class SceneGraph:
             solids=solids,
             deforming_surfaces=bent,
             lines=lines,
-            labels=told,
+            labels=labels,
         )
 
     @cached_property

@@ -78,10 +78,10 @@ class AppliedLoads:
         run, engine = self.observations.run, self.observations.engine
         return engine.observe(run.t, run.q, run.u, run.memory, probes, ("points",)).points
 
-    def values_at(self, places: tuple[int, ...]) -> Array:
+    def values_at(self, indices: tuple[int, ...]) -> Array:
         """Values (n, places) at some indices, 0 at index -1."""
-        result = np.zeros((len(self.observations.run.t), len(places)))
-        for k, slot in enumerate(places):
+        result = np.zeros((len(self.observations.run.t), len(indices)))
+        for k, slot in enumerate(indices):
             if slot >= 0:
                 result[:, k] = self._values[:, slot]
         return result

@@ -45,13 +45,13 @@ class SampledVariable:
 
 
 def sampled_variables(
-    model: CompiledScene, states: RunStates, one: ActiveExpression, own: Hinge | None
+    model: CompiledScene, states: RunStates, active: ActiveExpression, own: Hinge | None
 ) -> dict[str, SampledVariable] | None:
     """Variables of an expression along a run, by name; None if one of them is unknown."""
-    constants = dict(one.constants)
-    length = None if one.spring is None else _spring_length(model, states, one)
+    constants = dict(active.constants)
+    length = None if active.spring is None else _spring_length(model, states, active)
     variables = dict[str, SampledVariable]()
-    for name in one.expression.names:
+    for name in active.expression.names:
         if name.text in constants or (own is not None and name.text in own.parameters):
             continue
         course = _sampled_variable(model, states, name, own, length)
@@ -107,10 +107,10 @@ def _sampled_input(model: CompiledScene, states: RunStates, name: str) -> Sample
 
 
 def _spring_length(
-    model: CompiledScene, states: RunStates, one: ActiveExpression
+    model: CompiledScene, states: RunStates, active: ActiveExpression
 ) -> SampledVariable:
     """Length of the spring of an expression (m) and its rate (m/s)."""
-    engine, spring = model.looped, one.spring
+    engine, spring = model.looped, active.spring
     assert spring is not None
     probes = []
     for reference in (spring.from_, spring.to):

@@ -58,8 +58,8 @@ def spring_effort(acting: AppliedLoads, spring: Spring) -> Array:
     """Effort (n,) in N. SceneError for a user-defined element, whose law is unknown here."""
     if spring.type != "spring":
         raise SceneError(
-            f'"{spring.name}.effort": the law of a force element "{spring.type}" is not known to '
-            f"results; there are {spring.name}.length and {spring.name}.length_rate"
+            f'"{spring.name}.effort": the law of a force element "{spring.type}" is not '
+            f"available; use {spring.name}.length and {spring.name}.length_rate"
         )
     law = spring.law
     length, rate = spring_motion(acting.observations, spring)

@@ -181,7 +181,7 @@ def test_loads_of_sections_are_told_by_the_shapes_alone() -> None:
     run = coupled.simulate(TIMES[-1], output_times=TIMES, rtol=1e-9)
     expected = run.bending_moment("bar", ROD / 2)
     np.testing.assert_allclose(moment, expected, atol=0.03 * np.abs(expected).max())
-    with pytest.raises(SceneError, match='"bar": loads of a loop on its ends are those of the rig'):
+    with pytest.raises(SceneError, match='"bar": loop loads on its ends are those of the rig'):
         found.section_force("bar", 0.1)
     assert "missed" not in str(found.certificate) and not found.warnings
 

@@ -207,7 +207,7 @@ def test_quantities_by_name(run: Result) -> None:
     [
         (lambda r: r.curvature("hub", 0.1), r'"hub": curvature .* flexible .* "blade"'),
         (lambda r: r.deflection("blad", 0.1), r'no such flexible body.*"blade"'),
-        (lambda r: r.deflection("blade", 1.2), r"x = 1\.2 m lies off the beam.* 0 to 1 m"),
+        (lambda r: r.deflection("blade", 1.2), r"x = 1\.2 m is not on the beam.* 0 to 1 m"),
         (lambda r: r.deflection("blade", "tpi"), 'no end "tpi"; it has'),
         (lambda r: r.bending_moment("blade", 0, source="guess"), '"equilibrium" or "shapes"'),
         (lambda r: r.axial_force("blade", 0, source="shapes"), "no axial modes"),
@@ -290,5 +290,5 @@ def test_an_elastic_body_has_what_needs_no_axis(tmp_path: Path) -> None:
     again = mstmm.load_result(run.save(tmp_path / "bar.nc"))
     np.testing.assert_array_equal(again.modal_energy("bar"), run.modal_energy("bar"))
     for ask in (run.deflection, run.curvature, run.bending_moment):
-        with pytest.raises(mstmm.SceneError, match=r'"bar": \w+ is known along beams'):
+        with pytest.raises(mstmm.SceneError, match=r'"bar": \w+ exists along beams only'):
             ask("bar", 0.1)

@@ -139,7 +139,7 @@ def test_shape_in_inertial_axes() -> None:
 
 @pytest.mark.parametrize(
     ("x", "words"),
-    [(2.1, r"x = 2\.1 m lies off the beam; expected 0 to 2 m"), (np.nan, "x = nan"),
+    [(2.1, r"x = 2\.1 m is not on the beam; expected 0 to 2 m"), (np.nan, "x = nan"),
      ([[0.0]], r"shape \(1, 1\), expected one number or \(m,\)")],
 )  # fmt: skip
 def test_places_off_the_beam_are_refused(x: Any, words: str) -> None:
