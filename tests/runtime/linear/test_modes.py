@@ -56,14 +56,14 @@ def test_few_vectors_are_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where there is no room for more, the search goes on from what it has."""
     linear = of(hanging(450)).linearize(disturbances=())
     expected = linear.modes(10)
-    monkeypatch.setattr(lanczos_iteration, "_VECTORS", 1)
-    monkeypatch.setattr(lanczos_iteration, "_ROOM", 14)
+    monkeypatch.setattr(lanczos_iteration, "_VECTORS_PER_MODE", 1)
+    monkeypatch.setattr(lanczos_iteration, "_EXTRA_VECTORS", 14)
     modes = linear.modes(10)
     assert modes.is_complete
     np.testing.assert_allclose(modes.omega, expected.omega, rtol=1e-9)
     units = np.einsum("ik,ij,jl->kl", modes.shapes, linear.M, modes.shapes)
     np.testing.assert_allclose(units, np.eye(10), atol=1e-9)
-    monkeypatch.setattr(lanczos_iteration, "_RUNS", 1)
+    monkeypatch.setattr(lanczos_iteration, "_MAX_RUNS", 1)
     with pytest.raises(NumericalFailure, match="of 12 modes found"):
         linear.modes(10)
 

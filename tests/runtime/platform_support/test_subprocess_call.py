@@ -89,7 +89,7 @@ def test_long_bodies_are_made_apart(monkeypatch: pytest.MonkeyPatch) -> None:
         used.append(what)
         return run_in_subprocess(what, *call)
 
-    monkeypatch.setattr(modal_elastic, "LONG", 0.0)
+    monkeypatch.setattr(modal_elastic, "SUBPROCESS_UNKNOWNS", 0.0)
     monkeypatch.setattr(modal_elastic, "run_in_subprocess", recorded)
     there = made()
     assert used == ['elastic "bar"'] and there.notes == here.notes
