@@ -226,7 +226,7 @@ def test_an_input_on_a_flexible_body_pushes_as_the_force_does() -> None:
 
 
 def test_an_input_that_drives_is_no_push() -> None:
-    with pytest.raises(SceneError, match='the drive of hinge "crank" follows this input'):
+    with pytest.raises(SceneError, match='the drive of hinge "crank" depends on this input'):
         model("looped").linearize([0.1, 0.2], inputs=["angle"])
 
 
