@@ -114,7 +114,7 @@ def _tangent_text(engine: ElementNames, element: int, at: str, code: int) -> str
             "step, or give the motion inertia (law.inertia) or a spring"
         )
     return (
-        f"{subject} {at}: the equations of an implicit step are singular for a motion: it has no "
+        f"{subject} {at}: a motion is undetermined in the equations of an implicit step: it has no "
         "inertia, stiffness or damping, or a negative stiffness cancels them; use a shorter step, "
         "or give the motion inertia (law.inertia) or a spring"
     )
