@@ -88,7 +88,7 @@ def test_closed_equations_are_those_that_the_engine_computes(
 ) -> None:
     """M and h at states far from the start, where other branches are in force."""
     model = mstmm.compile(SCENES[name], engine="looped")
-    found, free = closed(model), list(closed(model).free)
+    found, free = closed(model), list(closed(model).free_speed_indices)
     for _ in range(3):
         q, u = rng.uniform(-1.5, 1.5, model.nq), rng.uniform(-2, 2, model.nu)
         if name == "a ball and a slider":
@@ -115,7 +115,7 @@ def test_numbers_of_the_start_come_with_the_symbols() -> None:
     q = found.coordinates[0].symbol
     assert sp.ImmutableMatrix([[m]]) == found.M
     assert sp.ImmutableMatrix([[-m * g * sp.cos(q)]]) == found.h
-    assert found.numbers[m] == 1.0 and found.numbers[g] == -9.81
+    assert found.parameter_values[m] == 1.0 and found.parameter_values[g] == -9.81
     assert found.coordinates[0].name == "pivot.angle" and found.coordinates[0].unit == "rad"
 
 
@@ -131,7 +131,7 @@ def test_an_input_of_a_law_and_of_a_load_stays_a_symbol(value: float) -> None:
     lever = sp.Rational("0.3") * sp.Rational("2.5") * sp.Rational("9.81")
     expected = lever * sp.cos(q) - 3 * push + sp.Rational("0.7") * pull * t * sp.sin(q)
     assert sp.simplify(found.h[0] - expected) == 0
-    assert list(found.inputs) == ["push", "pull"] and found.numbers[push] == value
+    assert list(found.inputs) == ["push", "pull"] and found.parameter_values[push] == value
 
 
 def test_a_drive_that_follows_an_input_has_its_rates_as_symbols() -> None:

@@ -165,7 +165,7 @@ def test_quantities_of_members(runs: tuple[Any, Any]) -> None:
             found, wanted = getattr(run, kind)(name), getattr(plain, kind)(written)
             assert np.allclose(found, wanted, rtol=1e-6, atol=1e-6), (name, kind)
     for name in ("rope[0].hinge", "rope[4].hinge", "hook"):
-        for kind in ("force", "moment", "effort", "coordinate", "speed"):
+        for kind in ("force", "moment", "effort", "coordinates", "speeds"):
             found, wanted = getattr(run, kind)(name), getattr(plain, kind)(plain_name(name))
             assert np.allclose(found, wanted, rtol=1e-6, atol=1e-6), (name, kind)
     assert np.array_equal(run.quantity("side[3].tip.vx").values, run.velocity("side[3].tip")[:, 0])

@@ -56,7 +56,7 @@ def gamma(motion: Any, ports: dict[str, Any] | None = None, gravity: Any = STILL
 def test_gamma_of_spin_acceleration_and_end_load(stiffening: bool) -> None:
     """Known integrals of the first clamped-free shape; a linear beam is judged by what it omits."""
     body, square = plain_beam(stiffening=stiffening), first_squared()
-    spun = gamma(moving(body, spin=[7.0, 0.0, 3.0]))
+    spun = gamma(moving(body, angular_velocity=[7.0, 0.0, 3.0]))
     assert spun == pytest.approx((0.0, 9.0 * G1 / square), rel=1e-4)
     pushed = gamma(moving(body, acceleration=[5.0, 0.0, 0.0]))
     assert pushed == pytest.approx((-5.0 * G0 / LENGTH / square, 0.0), rel=1e-4)
@@ -76,9 +76,9 @@ def test_gamma_reaches_one_at_the_buckling_load() -> None:
 def test_spin_across_the_beam_counts() -> None:
     body = plain_beam()
     assert modal_frequencies(body)[0] == pytest.approx(np.sqrt(first_squared()), rel=1e-9)
-    assert range_estimators.transverse_spin(moving(body, spin=[9.0, 3.0, 4.0])) == pytest.approx(
-        5.0
-    )
+    assert range_estimators.transverse_spin(
+        moving(body, angular_velocity=[9.0, 3.0, 4.0])
+    ) == pytest.approx(5.0)
 
 
 def test_slope_and_turn() -> None:

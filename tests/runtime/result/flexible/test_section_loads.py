@@ -66,7 +66,7 @@ def test_weight_that_the_shapes_cannot_follow() -> None:
 
 
 def test_axial_force_of_a_spinning_beam() -> None:
-    motion = moving(beam(), spin=[0.0, 3.0, 4.0])
+    motion = moving(beam(), angular_velocity=[0.0, 3.0, 4.0])
     inner, _ = section_loads(motion, X, STILL, 0.0)
     exact = MASS * 25.0 * (LENGTH**2 - X**2) / 2
     np.testing.assert_allclose(inner[0, :, 0], exact, rtol=1e-12, atol=1e-12)
@@ -113,7 +113,7 @@ def test_drag_and_inertia_balance_a_beam_that_is_slowed_by_its_drag_alone() -> N
 
 def test_a_twisted_beam_carries_the_torque_of_its_polar_inertia() -> None:
     body = beam(polar_inertia_per_length=0.03, torsional_stiffness=20.0, modes={"y": 1, "twist": 2})
-    spun = moving(body, spin_rate=[5.0, 0.0, 0.0])
+    spun = moving(body, angular_acceleration=[5.0, 0.0, 0.0])
     _, moment = section_loads(spun, X, STILL, 0.0)
     np.testing.assert_allclose(moment[0, :, 0], -0.03 * 5.0 * (LENGTH - X), atol=1e-12)
     twist = [k for k, name in enumerate(body.modes) if name.startswith("twist")]
