@@ -91,7 +91,7 @@ WORDS: dict[str, tuple[Callable[[Any, Any], Any], str]] = {
     ),
     "progress": (
         lambda r, x: r.model.simulate(
-            0.1, execution=mstmm.Execution(progress=3 if callable(x) else x)
+            0.1, execution=mstmm.Execution(progress=3 if callable(x) else x)  # type: ignore[arg-type]
         ),
         "progress = .*: expected",
     ),

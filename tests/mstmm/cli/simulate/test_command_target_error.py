@@ -52,7 +52,7 @@ def test_it_is_what_the_library_gives(mstmm: Command, folder: Path) -> None:
         (("--error", "1e-6", "--of", "nothing"), "no such quantity"),
         (("--error", "2"), "less than 1"),
         (("--error", "0"), "--error"),
-        (("--of", "energy"), "give error too"),
+        (("--of", "energy"), "give --error too"),
     ],
 )
 def test_what_makes_no_sense_is_refused(
