@@ -83,7 +83,7 @@ class _SceneBuilder:
             title=title, times=self.frame_times.times, speed=self.frame_times.speed,
             up=self._up_direction(), poses=self.poses, solids=tuple(solids),
             deforming_surfaces=(*self._deforming_surfaces(), *self.load_arrows.arrow_surfaces()),
-            lines=(*self._coils(), *self._trail_lines()),
+            lines=(*self._coils(), *self._path_lines()),
             labels=dict([*self._body_labels(), *self.load_arrows.label_texts()]), notes=self.notes,
         )  # fmt: skip
         gravity_objects = gravity_arrow(scene_graph, float(np.linalg.norm(self.scene.gravity)))
@@ -242,7 +242,7 @@ class _SceneBuilder:
             return np.tile(np.array(spring.position), (len(self.frame_times.times), 1))
         return self.frame_times.poses(self.run, reference).position
 
-    def _trail_lines(self) -> Iterator[Line]:
+    def _path_lines(self) -> Iterator[Line]:
         for reference in self.trails:
             if split_reference(reference)[0] == GROUND:
                 raise SceneError(
