@@ -150,4 +150,4 @@ def test_a_run_without_a_next_step_goes_on_by_another_method(lab: Lab) -> None:
     limited = lab.mechanism("pendulum", 20.0, 0.5).run("rodas5p", 1.5, start, max_steps=5)
     assert limited.advance(60.0) is Status.TOO_MANY_STEPS and not limited.no_step
     with pytest.raises(SceneError, match="cannot continue this run"):
-        limited.change(get("dop853"))
+        limited.switch_method(get("dop853"))

@@ -31,7 +31,7 @@ def some_motion(body: ModalBody, size: float) -> dict[str, Any]:
     turn *= np.linalg.det(turn)
     return {
         "rotation": turn, "position": [0.4, -1.0, 2.0], "velocity": [1.0, 2.0, -0.5],
-        "spin": [0.8, -1.1, 0.6], "eta": size * random.normal(size=body.n),
+        "angular_velocity": [0.8, -1.1, 0.6], "eta": size * random.normal(size=body.n),
         "etad": size * random.normal(size=body.n),
     }  # fmt: skip
 
@@ -42,7 +42,7 @@ def particles(body: ModalBody, given: dict[str, Any]) -> tuple[Array, Array, Arr
     x, weights = body.shapes.rule()
 
     def places(t: float) -> Array:
-        small = observe.section_rotations(np.asarray(given["spin"]) * t)
+        small = observe.section_rotations(np.asarray(given["angular_velocity"]) * t)
         then = {
             "rotation": small @ given["rotation"],
             "position": np.asarray(given["position"]) + t * np.asarray(given["velocity"]),
@@ -93,8 +93,8 @@ def test_equivalent_motion_is_that_of_the_frame_while_nothing_is_bent() -> None:
     given = some_motion(body, 0.0)
     found = kernel_momentum(moving(body, **given))
     arm = np.asarray(given["rotation"]) @ [LENGTH / 2, 0.0, 0.0]
-    np.testing.assert_allclose(found.angular_velocity[0], given["spin"], rtol=1e-12)
-    expected = np.asarray(given["velocity"]) + np.cross(given["spin"], arm)
+    np.testing.assert_allclose(found.angular_velocity[0], given["angular_velocity"], rtol=1e-12)
+    expected = np.asarray(given["velocity"]) + np.cross(given["angular_velocity"], arm)
     np.testing.assert_allclose(found.velocity[0], expected, rtol=1e-12)
 
 
@@ -103,7 +103,7 @@ def test_a_mean_frame_follows_the_equivalent_velocity_exactly() -> None:
     given = some_motion(body, 0.05)
     motion = moving(body, **given)
     arm = np.asarray(given["rotation"]) @ [LENGTH / 2, 0.0, 0.0]
-    expected = np.asarray(given["velocity"]) + np.cross(given["spin"], arm)
+    expected = np.asarray(given["velocity"]) + np.cross(given["angular_velocity"], arm)
     np.testing.assert_allclose(kernel_momentum(motion).velocity[0], expected, rtol=1e-12)
 
 
