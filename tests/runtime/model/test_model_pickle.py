@@ -57,7 +57,7 @@ def test_a_model_keeps_its_numbers_and_what_was_asked(sweep: str) -> None:
     model = mstmm.compile(pins(2, [1.0, 0.3]), sweep=sweep).with_parameters({"rod0.mass": 2.0})
     again = pickle.loads(pickle.dumps(model))
     assert again.packed_scene.qr == model.packed_scene.qr
-    assert again.parameters == model.parameters and again.engine_choice == model.engine_reason
+    assert again.parameters == model.parameters and again.engine_reason == model.engine_reason
     q, u = model.initial_state()
     np.testing.assert_array_equal(again.accelerations(q, u), model.accelerations(q, u))
 
