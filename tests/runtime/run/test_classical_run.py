@@ -99,7 +99,7 @@ def test_options_are_for_this_method_alone() -> None:
         model.simulate(0.1, mstmm.methods.ClassicalDiscreteTime("dop853", scheme="hht"))
     with pytest.raises(SceneError, match="takes neither scheme nor iterations"):
         model.simulate(0.1, mstmm.methods.ClassicalDiscreteTime("dop853", iterations=2))
-    with pytest.raises(SceneError, match=r'scheme: method "dop853" .*ClassicalDiscreteTime'):
+    with pytest.raises(SceneError, match=r'scheme: method "dop853" .*dttmm-classical'):
         mstmm.methods.method("dop853", scheme="hht")
 
 
